@@ -218,7 +218,7 @@ CellField solved(const tractions::LatticeProblem& problem, tractions::TikhonovSo
 double lambda_by_risk_um_per_kPa(const Registered& cell, const tractions::TractionParameters& parameters) {
   const tractions::LatticeProblem problem = problem_of(cell, parameters);
   tractions::TikhonovSolver solver(problem);
-  return tractions::chosen_lambda(tractions::scan_lambda(problem, solver), tractions::LambdaCriterion::risk);
+  return tractions::chosen_lambda(tractions::scan_lambda(problem, solver), inverse::LambdaCriterion::risk);
 }
 
 CellField field_of(const Registered& cell, const tractions::TractionParameters& parameters, double lambda_um_per_kPa) {
@@ -241,7 +241,7 @@ CellField blurred(const std::function<Vec2(Vec2 place_um)>& traction_kPa, const 
     }
   }
   const tractions::NodeField displacement = problem.displaced(problem.transform().forward(nodes));
-  const tractions::NodeField spread = problem.spread_of(problem.at_beads(displacement));
+  const tractions::NodeField spread = problem.spread(problem.at_beads(displacement));
   tractions::TikhonovSolver solver(problem, problem.pulled_back(spread), 1);
   return solved(problem, solver, cell, parameters, lambda_um_per_kPa);
 }

@@ -51,21 +51,6 @@ Line searched(const StiffnessRange& range, int n_steps, const ProfileAt& profile
   return line;
 }
 
-LinearData reweighed(LinearData data, tensions::Loss loss, const std::function<VectorXd(const LinearData&)>& amplitudes,
-                     std::optional<double> fixed_scale) {
-  constexpr int kMost = 30;
-  for (int k = 0; k < kMost; ++k) {
-    const VectorXd residual = tensions::weighted_residual(data, amplitudes(data));
-    const double scale = fixed_scale.value_or(tensions::robust_scale(data, residual));
-    if (!(scale > 0)) break;
-    const VectorXd weight = tensions::robust_weights(loss, residual, scale);
-    const double change = (weight - data.bead_weight).cwiseAbs().maxCoeff();
-    data = tensions::reweighted(std::move(data), weight);
-    if (change < 1e-3) break;
-  }
-  return data;
-}
-
 }  // namespace
 
 VectorXd best_loads(const MatrixXd& H, const VectorXd& right, Index n_bundles) {
@@ -255,10 +240,21 @@ void split_by_noise(std::vector<FittedEstimate>& estimates, const Linearised& ab
 
 LinearData weighed(LinearData data, tensions::Loss loss, const std::function<VectorXd(const LinearData&)>& amplitudes) {
   if (loss == tensions::Loss::squares) return data;
-  if (loss != tensions::Loss::tukey) return reweighed(std::move(data), loss, amplitudes, std::nullopt);
-  data = reweighed(std::move(data), tensions::Loss::huber, amplitudes, std::nullopt);
-  const double scale = tensions::robust_scale(data, tensions::weighted_residual(data, amplitudes(data)));
-  return reweighed(std::move(data), loss, amplitudes, scale);
+  constexpr int kMost = 30;
+  constexpr double kSettled = 1e-3;
+  double scale = 0;
+  for (const tensions::Loss step : inverse::in_turn(loss)) {
+    double change = 1;
+    for (int round = 0; round < kMost && change > kSettled; ++round) {
+      const VectorXd residual = tensions::weighted_residual(data, amplitudes(data));
+      if (step != tensions::Loss::tukey || round == 0) scale = tensions::robust_scale(data, residual);
+      if (!(scale > 0)) break;
+      const VectorXd weight = inverse::weights_of(step, residual, scale, 2);
+      change = (weight - data.bead_weight).cwiseAbs().maxCoeff();
+      data = tensions::reweighted(std::move(data), weight);
+    }
+  }
+  return data;
 }
 
 void add_misfit(SheetFit& fit, const LinearData& data, VectorXd node_amplitudes, double n_unknowns) {

@@ -52,19 +52,16 @@ Foresight::Foresight(const Problem& problem, const tractions::TractionParameters
   if (displacement_um.isZero(0)) throw UsageError("the known tractions move no bead");
   const MatrixXd norm = problem.norm_um2();
   const Basis basis = orthonormal_basis(norm);
-  const Rows rows(problem, VectorXd::Ones(displacement_um.size()));
+  const inverse::Rows rows = rows_of(problem, VectorXd::Ones(displacement_um.size()));
   const MatrixXd A = rows.of(basis.response(problem.response_um_per_kPa, threads)),
                  P = rows.of(problem.patch_response_um_per_nN);
-  const VectorXd u = rows.of(displacement_um), pulled = numerics::transposed_matvec(A, u);
-  MatrixXd normal = MatrixXd::Zero(A.cols(), A.cols());
-  numerics::add_upper_gram(A, normal, threads);
-  spectrum_.emplace(std::move(normal), pulled, u.squaredNorm(),
-                    static_cast<double>(u.size()) - static_cast<double>(rows.n_common()));
+  const VectorXd u = rows.of(displacement_um);
+  spectrum_.emplace(inverse::spectrum_of(A, u, static_cast<double>(u.size() - rows.n_beside()), threads));
   const MatrixXd& V = spectrum_->vectors();
   patches_ = numerics::gram(P, threads);
   hidden_ = numerics::small_transposed_product(V, numerics::small_transposed_product(A, P));
   pulled_by_patches_ = numerics::transposed_matvec(P, u);
-  pulled_ = numerics::transposed_matvec(V, pulled);
+  pulled_ = numerics::transposed_matvec(V, numerics::transposed_matvec(A, u));
   sums_ = numerics::small_transposed_product(V, sums_of(problem, basis));
   shown_ = shown_by(basis, norm, V);
 }
@@ -72,10 +69,10 @@ Foresight::Foresight(const Problem& problem, const tractions::TractionParameters
 Foreseen Foresight::at(double noise) const {
   const double stated = noise * noise;
   const double least = std::max(problem_.observed.states_errors ? stated : 0.0, problem_.variance_of_model());
-  const tractions::Spectrum noisy = spectrum_->with_noise(stated);
-  const tractions::LambdaScan scan =
-      noisy.scan(std::max(least, noisy.variance_felt_least().value_or(0)), tractions::SignalIn::told);
-  const ChosenLambda chosen = choose_lambda(problem_, scan, traction_, RiskIs::sound);
+  const inverse::Spectrum noisy = spectrum_->with_noise(stated);
+  const inverse::LambdaScan scan =
+      noisy.scan(std::max(least, noisy.variance_felt_least().value_or(0)), inverse::SignalIn::resolved);
+  const ChosenLambda chosen = choose_lambda(problem_, scan, traction_, RiskCriterion::usable);
   const double variance = std::max(scan.variance, least), lambda2 = chosen.lambda * chosen.lambda;
   const ArrayXd& values = spectrum_->values();
   const ArrayXd of_background = 1 / (values + lambda2);
@@ -94,7 +91,7 @@ Foreseen Foresight::at(double noise) const {
              .net_force_nN2 = {},
              .net_by_noise_nN2 = {},
              .resolution_um = {}};
-  const double of_sums = chosen.by == tractions::LambdaCriterion::risk ? scan.by_prediction : chosen.lambda;
+  const double of_sums = chosen.by == inverse::LambdaCriterion::risk ? scan.by_prediction : chosen.lambda;
   const ArrayXd of_sum = 1 / (values + of_sums * of_sums);
   f.net_force_nN2 = numerics::small_product(variance * sums_.transpose() * of_sum.matrix().asDiagonal(), sums_);
   f.net_by_noise_nN2 =

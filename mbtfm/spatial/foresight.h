@@ -36,12 +36,12 @@ class Foresight {
  private:
   const Problem& problem_;
   tractions::TractionParameters traction_;
-  std::optional<tractions::Spectrum> spectrum_;  ///< of A, the weighed answers to the unknowns
-  MatrixXd patches_;                             ///< PᵀP, P the weighed answers to forces
-  MatrixXd hidden_;                              ///< Vᵀ Aᵀ P
-  VectorXd pulled_by_patches_;                   ///< Pᵀ u
-  VectorXd pulled_;                              ///< Vᵀ Aᵀ u
-  MatrixXd sums_;                                ///< Vᵀ of the sum over the surface, x, y, z
+  std::optional<inverse::Spectrum> spectrum_;  ///< of A, the weighed answers to the unknowns
+  MatrixXd patches_;                           ///< PᵀP, P the weighed answers to forces
+  MatrixXd hidden_;                            ///< Vᵀ Aᵀ P
+  VectorXd pulled_by_patches_;                 ///< Pᵀ u
+  VectorXd pulled_;                            ///< Vᵀ Aᵀ u
+  MatrixXd sums_;                              ///< Vᵀ of the sum over the surface, x, y, z
   MatrixXd shown_;  ///< by vertex and direction: what of a change of its traction lies along it
 };
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/inverse/group_lasso.h"
 #include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/traction_mesh.h"
-#include "mbtfm/tractions/group_lasso.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
@@ -17,48 +17,28 @@ using Eigen::ArrayXd;
 
 namespace {
 
-using tractions::GroupLasso;
+using inverse::GroupLasso;
 
-ArrayXd lengths_of(const VectorXd& x) { return tractions::lengths_of(x, x.size() / 3); }
+ArrayXd lengths_of(const VectorXd& x) { return inverse::lengths_of(x, x.size() / 3); }
 
 VectorXd for_each_component(const VectorXd& by_place) { return by_place.replicate(3, 1); }
-
-/// ½ |A x − u|² without A.
-struct Squares {
-  MatrixXd normal;  ///< AᵀA
-  VectorXd pulled;  ///< Aᵀu
-  double data_squared = 0;
-  double misfit(const VectorXd& x) const {
-    return data_squared - 2 * x.dot(pulled) + numerics::quadratic_form(normal, x);
-  }
-};
-
-/// In the frame of AᵀA, so that no step factorises anything.
-GroupLasso::Solve solver_of(const Squares& squares) {
-  auto [values, vectors] = numerics::symmetric_eigen(squares.normal);
-  VectorXd projected = numerics::transposed_matvec(vectors, squares.pulled);
-  return [values = ArrayXd(values.array().max(0)), vectors = std::move(vectors), projected = std::move(projected)](
-             const VectorXd& added, double rho) -> VectorXd {
-    const VectorXd right = projected + numerics::transposed_matvec(vectors, added);
-    return numerics::matvec(vectors, (right.array() / (values + rho)).matrix());
-  };
-}
 
 /// The penalty at which the misfit is what noise leaves (Morozov's discrepancy): from where nothing is left, down.
 /// @param largest  from which on nothing is left
 /// @param target   the misfit aimed at
-double choose_mu(GroupLasso& lasso, const Squares& squares, double largest, double target) {
+double choose_mu(GroupLasso& lasso, const inverse::Spectrum& squares, double largest, double target) {
   constexpr double kStep = 0.63, kSmallest = 1e-4;
   double mu = 0.25 * largest, misfit_before = 0, mu_before = 0;
   for (; mu > kSmallest * largest; mu *= kStep) {
     lasso.minimise(mu);
-    const double misfit = squares.misfit(lasso.x());
+    const double misfit = squares.misfit_of(lasso.x());
     if (misfit <= target) break;
     misfit_before = misfit;
     mu_before = mu;
   }
   if (mu_before > 0 && mu > kSmallest * largest) {  // between the two, where it is met
-    const double share = std::clamp((misfit_before - target) / (misfit_before - squares.misfit(lasso.x())), 0.0, 1.0);
+    const double share =
+        std::clamp((misfit_before - target) / (misfit_before - squares.misfit_of(lasso.x())), 0.0, 1.0);
     mu = mu_before * std::pow(mu / mu_before, share);
     lasso.minimise(mu);
   }
@@ -82,8 +62,9 @@ struct Posterior {
   MatrixXd covariance;
 };
 
-Posterior posterior_of(const VectorXd& at_minimum, const Squares& squares, const ArrayXd& penalty, double variance,
-                       int threads) {
+/// @param normal, adjoint  AᵀA and Aᵀu
+Posterior posterior_of(const VectorXd& at_minimum, const MatrixXd& normal, const VectorXd& adjoint,
+                       const ArrayXd& penalty, double variance, int threads) {
   constexpr int kRounds = 4;
   const Index n = penalty.size();
   Posterior posterior{at_minimum, {}, {}};
@@ -91,8 +72,8 @@ Posterior posterior_of(const VectorXd& at_minimum, const Squares& squares, const
   for (int round = 0; round < kRounds; ++round) {
     const ArrayXd size = (lengths_of(posterior.mean).square() + spread).sqrt();
     posterior.precision_before = for_each_component((penalty / size).matrix());
-    posterior.covariance = inverse_of(squares.normal, posterior.precision_before, threads);
-    posterior.mean = numerics::matvec(posterior.covariance, squares.pulled);
+    posterior.covariance = inverse_of(normal, posterior.precision_before, threads);
+    posterior.mean = numerics::matvec(posterior.covariance, adjoint);
     const VectorXd diagonal = variance * posterior.covariance.diagonal();
     spread = diagonal.head(n) + diagonal.segment(n, n) + diagonal.tail(n);
   }
@@ -120,23 +101,22 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   for (Index v = 0; v < n; ++v)
     largest = std::max(largest, std::sqrt(areas[v]) * r.traction_kPa.segment<3>(3 * v).norm());
   const double variance = r.variance;
-  const Rows rows(problem, r.weighing.by_row);  // Tikhonov's weights
-  const MatrixXd weighed = rows.of(response);
-  const VectorXd data = rows.of(problem.displacement_um());
-  const Squares squares{numerics::gram(weighed, threads), numerics::transposed_matvec(weighed, data),
-                        data.squaredNorm()};
-  constexpr tractions::Settled kSettled{.change = 1e-3, .gap = 1e-3, .most_steps = 600};  // below what noise makes of x
-  GroupLasso lasso(solver_of(squares), 3 * n, weights, largest, kSettled);
+  const inverse::Rows rows = rows_of(problem, r.weighing.by_row);  // Tikhonov's weights
+  const MatrixXd weighed = rows.of(response), normal = numerics::gram(weighed, threads);
+  const VectorXd data = rows.of(problem.displacement_um()), adjoint = numerics::transposed_matvec(weighed, data);
+  const inverse::Spectrum squares(normal, adjoint, data.squaredNorm(), r.weighing.n_data);
+  constexpr inverse::Settled kSettled{.change = 1e-3, .gap = 1e-3, .most_steps = 600};  // below what noise makes of x
+  const auto solve = [&](const VectorXd& added, double rho) { return squares.solve(std::sqrt(rho), added); };
+  GroupLasso lasso(solve, 3 * n, weights, largest, kSettled);
   // The sum of n squares of the noise varies by sqrt(2/n), 2 % for 1 500 beads, and that is half of what the penalty
   // moves: the misfit aimed at is the one of the noise that these beads have, not of the one they state, and of what
   // their weights leave of it.
   const double aimed = std::max(r.variance_left, problem.variance_of_model());
-  const double mu =
-      choose_mu(lasso, squares, (lengths_of(squares.pulled) / weights).maxCoeff(), aimed * r.weighing.n_data);
+  const double mu = choose_mu(lasso, squares, (lengths_of(adjoint) / weights).maxCoeff(), aimed * r.weighing.n_data);
   const VectorXd& at_minimum = lasso.x();
   r.traction_kPa = basis.tractions(at_minimum);
-  r.relative_l2 = std::sqrt(std::max(0.0, squares.misfit(lasso.x())) / std::max(data.squaredNorm(), 1e-300));
-  const Posterior posterior = posterior_of(at_minimum, squares, mu * weights, variance, threads);
+  r.relative_l2 = std::sqrt(std::max(0.0, squares.misfit_of(lasso.x())) / std::max(data.squaredNorm(), 1e-300));
+  const Posterior posterior = posterior_of(at_minimum, normal, adjoint, mu * weights, variance, threads);
   r.covariance_kPa2 = basis.covariance(posterior.covariance, threads);
   r.summands = Summands{basis.tractions(posterior.mean), r.covariance_kPa2, {}};
   const VectorXd seen =

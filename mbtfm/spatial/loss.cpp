@@ -1,91 +1,41 @@
 #include "mbtfm/spatial/loss.h"
 
-#include <Eigen/LU>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 #include <utility>
 
 #include "mbtfm/spatial/observed.h"
-#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::spatial {
-namespace {
 
-// by number of components, 1 to 3
-constexpr std::array kHuber = {1.345, 1.501, 1.628}, kBiweight = {4.685, 5.123, 5.490};
-constexpr std::array kMedianLength = {0.6745, 1.1774, 1.5382};  ///< of Gaussian vectors (chi distribution)
-constexpr double kSmallest = 0.1;  ///< of a residual, where l1 has an edge: a tenth of a standard deviation
-
-/// Slope of psi.
-double slope(BeadLoss loss, double r, Index n) {
-  constexpr double kStep = 1e-4;  // psi is smooth but at a point
-  const auto psi = [&](double x) { return x * loss_weight(loss, x, n); };
-  return (psi(r + kStep) - psi(std::max(0.0, r - kStep))) / (r + kStep - std::max(0.0, r - kStep));
-}
-
-}  // namespace
-
-double loss_weight(BeadLoss loss, double r, Index n) {
-  const auto at = static_cast<std::size_t>(n - 1);
-  switch (loss) {
-    case BeadLoss::l2:
-      return 1;
-    case BeadLoss::mixture:
-      break;  // not by the residual
-    case BeadLoss::l1:
-    case BeadLoss::l1_by_component:
-      return kSmallest / std::max(r, kSmallest);
-    case BeadLoss::huber:
-      return std::min(1.0, kHuber.at(at) / std::max(r, 1e-300));
-    case BeadLoss::biweight: {
-      const double share = r / kBiweight.at(at);
-      return share < 1 ? (1 - share * share) * (1 - share * share) : 0;
-    }
-  }
-  throw InternalError("unknown loss");
-}
-
-double median_length(Index n_components) { return kMedianLength.at(static_cast<std::size_t>(n_components - 1)); }
-
-Weighing weigh(BeadLoss loss, const Observed& observed, const Eigen::VectorXd& residual, double degrees,
+Weighing weigh(BeadLoss loss, const Observed& observed, const VectorXd& residual, double degrees,
                const std::vector<double>& good) {
-  const bool is_by_component = loss == BeadLoss::l1_by_component;
-  const Index n = is_by_component ? 1 : observed.n_components(), n_groups = residual.size() / n;
-  std::vector<double> lengths;
-  for (Index b = 0; b < n_groups; ++b) lengths.push_back(residual.segment(n * b, n).norm());
+  const Index n = loss == BeadLoss::l1_by_component ? 1 : observed.n_components();
   const auto n_rows = static_cast<double>(residual.size());
   const double taken = std::sqrt(std::max(1 - degrees / n_rows, 0.1));  // followed noise leaves less
+  const auto by_row = [n](const VectorXd& by_group) -> VectorXd {
+    return by_group.transpose().replicate(n, 1).reshaped();
+  };
   Weighing weighing;
-  weighing.by_row = Eigen::VectorXd::Ones(residual.size());
   if (!weighs_by_residual(loss)) {
-    for (std::size_t k = 0; k < good.size(); ++k)
-      weighing.by_row.segment(n * static_cast<Index>(k), n).setConstant(good[k]);
+    weighing.by_row = good.empty() ? VectorXd::Ones(residual.size())
+                                   : by_row(VectorXd::Map(good.data(), static_cast<Index>(good.size())));
     weighing.n_data = std::max(weighing.by_row.sum(), 1e-300);
     weighing.scale = weighing.by_row.cwiseSqrt().cwiseProduct(residual).norm() / std::sqrt(weighing.n_data) / taken;
     weighing.variance = weighing.scale * weighing.scale;
     return weighing;
   }
-  weighing.scale = numerics::median(lengths) / median_length(n) / taken;
-  const double scale = std::max(observed.states_errors ? 1.0 : 0.0, weighing.scale);
-  double score = 0, curvature = 0, square = 0, mean = 0;  // means over the groups
-  for (Index b = 0; b < n_groups; ++b) {
-    const double r = lengths[b] / std::max(scale, 1e-300);
-    const double w = loss_weight(loss, r, n);
-    weighing.by_row.segment(n * b, n).setConstant(w);
-    score += w * w * r * r / n_rows;
-    square += w * r * r / n_rows;
-    curvature += (slope(loss, r, n) + static_cast<double>(n - 1) * w) / n_rows;
-    mean += w / static_cast<double>(n_groups);
-  }
-  // An M-estimator varies as least squares with weights `mean` and the variance of its scores over their slope squared
-  // (Maronna, Martin & Yohai, 10.3).
-  weighing.variance = scale * scale * mean * score / (curvature * curvature);
-  weighing.n_data = n_rows * scale * scale * square / weighing.variance;
+  const std::vector<double> lengths = inverse::residual_lengths(residual, n);
+  weighing.scale = inverse::scale_of(lengths, n) / taken;
+  const double scale = std::max(observed.states_errors ? 1.0 : 1e-300, weighing.scale);
+  weighing.by_row = by_row(inverse::weights_of(shape_of(loss), residual, scale, n));
+  const inverse::Estimator estimator = inverse::estimator_of(shape_of(loss), lengths, scale, n);
+  weighing.variance = estimator.variance;
+  weighing.n_data = n_rows * scale * scale * estimator.square / weighing.variance;
   return weighing;
 }
 
@@ -109,25 +59,23 @@ Prediction predicted(const MatrixXd& offsets, const MatrixXd& over_sigma, const 
   const Index n = offsets.rows(), n_components = over_sigma.cols();
   MatrixXd linear(n, kLinear);
   linear << VectorXd::Ones(n), offsets / std::max(offsets.rowwise().norm().maxCoeff(), 1e-300);
-  const auto median_of = [](const VectorXd& values) {
-    return numerics::median(std::vector<double>(values.begin(), values.end()));
-  };
   RowVectorXd middle(n_components);
-  for (Index c = 0; c < n_components; ++c) middle[c] = median_of(over_sigma.col(c));
-  VectorXd lengths = (over_sigma.rowwise() - middle).rowwise().norm();
+  for (Index c = 0; c < n_components; ++c)
+    middle[c] = numerics::median(std::vector<double>(over_sigma.col(c).begin(), over_sigma.col(c).end()));
+  MatrixXd residuals = (over_sigma.rowwise() - middle).transpose();  // a column each
   const double left = std::sqrt(static_cast<double>(n) / static_cast<double>(n - kLinear));
   Prediction made;
   MatrixXd normal;
   for (int round = 0; round < kRounds; ++round) {
-    made.scatter = left * median_of(lengths) / median_length(n_components);
-    VectorXd weights(n);
-    for (Index k = 0; k < n; ++k)
-      weights[k] =
-          std::max(1e-9, loss_weight(BeadLoss::biweight, lengths[k] / std::max(made.scatter, 1e-300), n_components));
+    made.scatter =
+        left * inverse::scale_of(inverse::residual_lengths(residuals.reshaped(), n_components), n_components);
+    const VectorXd weights =
+        inverse::weights_of(inverse::Loss::tukey, residuals.reshaped(), std::max(made.scatter, 1e-300), n_components)
+            .cwiseMax(1e-9);
     normal = linear.transpose() * weights.asDiagonal() * linear;
     normal.diagonal().array() += 1e-9 * normal(0, 0);  // beads in a plane tell nothing across it
     const MatrixXd field = numerics::solve_symmetric(normal, linear.transpose() * weights.asDiagonal() * over_sigma);
-    lengths = (over_sigma - linear * field).rowwise().norm();
+    residuals = (over_sigma - linear * field).transpose();
     made.distance = (own - field.row(0)).norm();
   }
   made.leverage = numerics::inverse_symmetric(normal)(0, 0);

@@ -13,21 +13,33 @@ namespace mbtfm::spatial {
 
 namespace {
 
-/// |W (u − A x)|² + lambda² |x|², of which tikhonov found the minimum.
-struct Functional {
-  MatrixXd response;  ///< W A
-  VectorXd data;      ///< W u
-  double lambda2 = 0;
-
-  VectorXd half_slope(const VectorXd& x) const {
-    return lambda2 * x - numerics::transposed_matvec(response, numerics::minus_matvec(data, response, x));
-  }
+/// The minimum of |P W S (u − G L x)|² + lambda² |x|², which tikhonov found, by conjugate gradients. With exact steps
+/// along lines Fletcher and Reeves' are the same (Nocedal & Wright, Numerical Optimization, 2006, 5.2).
+struct Descent {
+  VectorXd x;
+  int steps = 0;
+  bool is_settled = false;
 };
-
-Functional functional_of(const Problem& problem, const Basis& basis, const SpatialReconstruction& r, int threads) {
-  const Rows rows(problem, r.weighing.by_row);
-  return {rows.of(basis.response(problem.response_um_per_kPa, threads)), rows.of(problem.displacement_um()),
-          *r.lambda * *r.lambda};
+/// @param settled  of the slope at none
+Descent descend(const Problem& problem, const Basis& basis, const SpatialReconstruction& tikhonov, double settled,
+                int most, int threads) {
+  const inverse::Rows rows = rows_of(problem, tikhonov.weighing.by_row);
+  const MatrixXd A = rows.of(basis.response(problem.response_um_per_kPa, threads));
+  const double lambda2 = *tikhonov.lambda * *tikhonov.lambda;
+  VectorXd downhill = numerics::transposed_matvec(A, rows.of(problem.displacement_um())), step = downhill;
+  Descent found{.x = VectorXd::Zero(A.cols())};
+  double square = downhill.squaredNorm();
+  for (const double enough = settled * settled * square; found.steps < most && square > enough; ++found.steps) {
+    const VectorXd moved = numerics::transposed_matvec(A, numerics::matvec(A, step)) + lambda2 * step;
+    const double length = square / step.dot(moved);
+    found.x += length * step;
+    downhill -= length * moved;
+    const double next = downhill.squaredNorm();
+    step = downhill + next / square * step;
+    square = next;
+  }
+  found.is_settled = found.steps < most;
+  return found;
 }
 
 /// The displacement of the beads around a vertex, by the inverse of their distance.
@@ -50,27 +62,12 @@ SpatialReconstruction reconstruct_adjoint(const Problem& problem, const traction
   SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
   if (!r.lambda) return r;
   const Basis basis = orthonormal_basis(problem.norm_um2());
-  const Functional f = functional_of(problem, basis, r, threads);
-  constexpr double kSettled = 1e-12;
   constexpr int kMost = 20000;
-  VectorXd x = VectorXd::Zero(f.response.cols()), downhill = -f.half_slope(x), step = downhill;
-  const double first = downhill.squaredNorm();
-  double square = first;
-  int iterations = 0;
-  for (; iterations < kMost && square > kSettled * kSettled * first; ++iterations) {
-    const VectorXd moved =
-        numerics::transposed_matvec(f.response, numerics::matvec(f.response, step)) + f.lambda2 * step;
-    const double length = square / step.dot(moved);
-    x += length * step;
-    downhill -= length * moved;
-    const double next = downhill.squaredNorm();
-    step = downhill + next / square * step;
-    square = next;
-  }
-  if (iterations == kMost)
+  const Descent found = descend(problem, basis, r, 1e-12, kMost, threads);
+  if (!found.is_settled)
     throw NotSolved({.reason = "adjoint: the equations are not solved after " + std::to_string(kMost) + " steps"});
-  r.traction_kPa = basis.tractions(x);
-  r.figures.emplace_back("adjoint_solves", std::int64_t{2 * iterations});
+  r.traction_kPa = basis.tractions(found.x);
+  r.figures.emplace_back("adjoint_solves", std::int64_t{2 * found.steps});
   return r;
 }
 
@@ -79,27 +76,14 @@ SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tracti
   SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
   if (!r.lambda) return r;
   const Basis basis = orthonormal_basis(problem.norm_um2());
-  const Functional f = functional_of(problem, basis, r, threads);
-  constexpr double kSettled = 1e-6;                // of the slope
   constexpr int kMost = 5000, kSolvesOfLine = 10;  // Numerical Recipes' bracket and parabolas take about so many
-  VectorXd x = VectorXd::Zero(f.response.cols());
-  // the differences of a sum of squares: of each unknown by a step e, [T(x + e) − T(x − e)] / 2e, is the slope itself
-  VectorXd downhill = -2 * f.half_slope(x), step = downhill;
-  const double first = downhill.norm();
-  int steps = 0;
-  for (; steps < kMost && downhill.norm() > kSettled * first; ++steps) {
-    const VectorXd moved = numerics::matvec(f.response, step);
-    const double length = 0.5 * downhill.dot(step) / (moved.squaredNorm() + f.lambda2 * step.squaredNorm());
-    x += length * step;
-    const VectorXd next = -2 * f.half_slope(x);
-    step = next + next.squaredNorm() / downhill.squaredNorm() * step;  // Fletcher & Reeves
-    downhill = next;
-  }
-  r.traction_kPa = basis.tractions(x);
-  r.figures.emplace_back("thesis_steps", std::int64_t{steps});
-  r.figures.emplace_back("thesis_direct_solves", std::int64_t{steps} * (f.response.cols() + 1 + kSolvesOfLine));
-  r.remark = "the thesis' program would solve the gel " +
-             std::to_string(std::int64_t{steps} * (f.response.cols() + 1 + kSolvesOfLine)) + " times for this";
+  const Descent found = descend(problem, basis, r, 1e-6, kMost, threads);
+  r.traction_kPa = basis.tractions(found.x);
+  // of each unknown by a step e, [T(x + e) − T(x − e)] / 2e: of a sum of squares that is the slope itself
+  const std::int64_t n_solves = std::int64_t{found.steps} * (found.x.size() + 1 + kSolvesOfLine);
+  r.figures.emplace_back("thesis_steps", std::int64_t{found.steps});
+  r.figures.emplace_back("thesis_direct_solves", n_solves);
+  r.remark = "the thesis' program would solve the gel " + std::to_string(n_solves) + " times for this";
   return r;
 }
 

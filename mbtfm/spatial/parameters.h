@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "mbtfm/inverse/loss.h"
 #include "pipeline/contract/words.h"
 #include "pipeline/stage/parameters_fwd.h"
 
@@ -21,6 +22,11 @@ constexpr auto words(Region) { return std::array{"auto", "all", "outline", "adhe
 /// the last.
 enum class BeadLoss { l2, mixture, l1, huber, biweight, l1_by_component };
 constexpr auto words(BeadLoss) { return std::array{"l2", "mixture", "l1", "huber", "biweight", "l1-by-component"}; }
+/// Of its weights by the residual; squares where they are not by that.
+constexpr inverse::Loss shape_of(BeadLoss loss) {
+  using enum inverse::Loss;
+  return std::array{squares, squares, l1, huber, tukey, l1}.at(static_cast<std::size_t>(loss));
+}
 
 /// Where the faces on which tractions are bilinear are smaller.
 enum class Refine {

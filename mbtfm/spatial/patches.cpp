@@ -25,14 +25,6 @@ MatrixXd shapes_of(const Problem& problem, const MatrixXd& areas_um2) {
   return shapes;
 }
 
-/// Misfit per datum that is left, of patches alone.
-double misfit_alone(const Problem& problem, const MatrixXd& response, const VectorXd& weights, double n_data,
-                    int threads) {
-  const auto spectrum = spectrum_of(problem, response, weights, n_data, threads);
-  const double least = 1e-8 * std::sqrt(spectrum.values().maxCoeff());
-  return spectrum.misfit(least) / std::max(1.0, n_data - static_cast<double>(response.cols()));
-}
-
 /// Tractions that may be anywhere.
 struct Anywhere {
   Basis basis;
@@ -45,26 +37,18 @@ Anywhere tractions_anywhere(const Problem& problem, int threads) {
 }
 
 /// How far what the patches leave looks like tractions beside them, as a standard normal deviate. With y the rows
-/// less their best forces on the patches, A the answer to tractions of variance one anywhere and M the projection off
-/// the patches' answers, y'A A'y is the score of these tractions' variance at zero. Over y'y per datum, if patches are
+/// less their best forces on the patches, A the response to tractions of variance one anywhere and M the projection off
+/// the patches' response, y'A A'y is the score of these tractions' variance at zero. Over y'y per datum, if patches are
 /// all there is, it has the first two moments of a scaled chi-squared of h = (tr K)²/tr K² with K = A'M A, which the
 /// cube root makes normal (Wilson & Hilferty, PNAS 17 (1931) 684). Taken off before is what a field of the size of the
 /// gel's model error adds on the average, if tractions of variance one made it: that error is no noise.
 /// Source: Lin, Biometrika 84 (1997) 309.
-double deviate_of_tractions_beside(const Problem& problem, const MatrixXd& of_patches, const MatrixXd& anywhere,
-                                   const VectorXd& weights_by_row, double n_data, int threads) {
-  const Rows rows(problem, weights_by_row);
-  const MatrixXd P = rows.of(of_patches);
-  const MatrixXd Q = numerics::orthonormal_basis(P);
-  const auto beside = [&](const MatrixXd& what) -> MatrixXd {
-    return numerics::minus_product(what, Q, numerics::small_transposed_product(Q, what));
-  };
-  const MatrixXd u = rows.of(problem.displacement_um()), y = beside(u), MA = beside(rows.of(anywhere));
-  MatrixXd K = MatrixXd::Zero(MA.cols(), MA.cols());
-  numerics::add_upper_gram(MA, K, threads);
-  K = K.selfadjointView<Eigen::Upper>();
+/// @param beside  the rows, with the patches as a block beside  @param degrees  of freedom that y has
+double deviate_of_tractions_beside(const Problem& problem, const inverse::Rows& beside, const MatrixXd& anywhere,
+                                   const VectorXd& weights_by_row, double degrees, int threads) {
+  const VectorXd u = rows_of(problem, weights_by_row).of(problem.displacement_um());
+  const MatrixXd y = beside.of(problem.displacement_um()), MA = beside.of(anywhere), K = numerics::gram(MA, threads);
   const double trace = K.trace(), trace_of_square = K.squaredNorm();
-  const double degrees = std::max(1.0, n_data - static_cast<double>(P.cols() + rows.n_common()));
   const double of_gel = std::pow(problem.model_error, 2) * u.squaredNorm() * trace_of_square / trace;
   const double score = std::max(0.0, numerics::small_transposed_product(MA, y).squaredNorm() - of_gel);
   const double h = trace * trace / trace_of_square;
@@ -114,7 +98,9 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   }
   r = reconstruct_in(Basis(std::move(shapes)), response, problem, penalised, parameters, threads);
   if (r.covariance_kPa2.size() == 0) return r;  // nothing has moved
-  const double alone = misfit_alone(problem, of_patches, r.weighing.by_row, r.weighing.n_data, threads);
+  const inverse::Rows beside = rows_of(problem, r.weighing.by_row, of_patches);
+  const auto degrees = [&](Index n_fitted) { return std::max(1.0, r.weighing.n_data - static_cast<double>(n_fitted)); };
+  const double alone = beside.of(problem.displacement_um()).squaredNorm() / degrees(of_patches.cols());
   if (!has_background && !weighs_by_residual(parameters.loss)) {
     const double variance = std::max(alone, problem.least_variance());
     r.covariance_kPa2 *= variance / r.variance;
@@ -131,8 +117,8 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
       has_background
           ? r.variance
           : reconstruct_in(anywhere.basis, anywhere.response, problem, traction, parameters, threads).variance;
-  const double deviate = deviate_of_tractions_beside(problem, of_patches, anywhere.response, r.weighing.by_row,
-                                                     r.weighing.n_data, threads);
+  const double deviate = deviate_of_tractions_beside(problem, beside, anywhere.response, r.weighing.by_row,
+                                                     degrees(beside.n_beside()), threads);
   r.figures.emplace_back("misfit_of_patches_alone", alone / noise);
   r.figures.emplace_back("tractions_beside_patches", deviate);
   r.findings.push_back(noticed(Symptom::patches_do_not_fit, deviate));

@@ -1,6 +1,5 @@
 #include "mbtfm/spatial/problem.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -188,7 +187,7 @@ VectorXd Problem::residual(const VectorXd& traction_kPa, const VectorXd& weights
 
 VectorXd Problem::over_errors(const VectorXd& rows_um, const VectorXd& weights_by_row) const {
   if (common_um.cols() == 0) return rows_um.cwiseQuotient(observed.sigma_um);
-  const MatrixXd common = Rows(*this, weights_by_row).common_in(rows_um);
+  const MatrixXd common = rows_of(*this, weights_by_row).beside_in(rows_um);
   return (rows_um - common_um * common).cwiseQuotient(observed.sigma_um);
 }
 
@@ -268,15 +267,11 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
   return problem;
 }
 
-tractions::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
-                                double n_data, int threads) {
-  const Rows rows(problem, weights_by_row);
-  const MatrixXd weighed = rows.of(response);
-  const VectorXd data = rows.of(problem.displacement_um());
-  MatrixXd normal = MatrixXd::Zero(weighed.cols(), weighed.cols());
-  numerics::add_upper_gram(weighed, normal, threads);
-  return {std::move(normal), numerics::transposed_matvec(weighed, data), data.squaredNorm(),
-          n_data - static_cast<double>(rows.n_common())};
+inverse::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
+                              double n_data, int threads) {
+  const inverse::Rows rows = rows_of(problem, weights_by_row);
+  return inverse::spectrum_of(rows.of(response), rows.of(problem.displacement_um()),
+                              n_data - static_cast<double>(rows.n_beside()), threads);
 }
 
 MatrixXd common_motions(const Observed& observed) {
@@ -294,42 +289,24 @@ MatrixXd common_motions(const Observed& observed) {
   return motions;
 }
 
-Rows::Rows(const Problem& problem, const VectorXd& weights_by_row)
-    : roots_(weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um)) {
-  if (problem.common_um.cols() == 0) return;
-  weighed_common_ = roots_.asDiagonal() * problem.common_um;
-  common_ = numerics::orthonormal_basis(weighed_common_);
-}
-
-MatrixXd Rows::of(const MatrixXd& by_row) const {
-  MatrixXd weighed = roots_.asDiagonal() * by_row;
-  if (common_.cols() > 0)
-    weighed -= numerics::small_product(common_, numerics::small_transposed_product(common_, weighed));
-  return weighed;
-}
-
-MatrixXd Rows::transposed(const MatrixXd& weighed) const {
-  if (common_.cols() == 0) return roots_.asDiagonal() * weighed;
-  return roots_.asDiagonal() *
-         (weighed - numerics::small_product(common_, numerics::small_transposed_product(common_, weighed)));
-}
-
-MatrixXd Rows::common_in(const MatrixXd& by_row) const {
-  return numerics::shortest_solution(weighed_common_, roots_.asDiagonal() * by_row);
+inverse::Rows rows_of(const Problem& problem, const VectorXd& weights_by_row, const MatrixXd& columns) {
+  const Index n_common = problem.common_um.cols();
+  MatrixXd beside(weights_by_row.size(), n_common + columns.cols());
+  if (n_common > 0) beside.leftCols(n_common) = problem.common_um;
+  if (columns.cols() > 0) beside.rightCols(columns.cols()) = columns;
+  return {weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um), beside};
 }
 
 std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, const SpatialReconstruction& found) {
   if (problem.common_um.cols() == 0 || found.covariance_kPa2.size() == 0) return std::nullopt;
-  const Rows rows(problem, found.weighing.by_row);
-  const VectorXd roots = found.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
-  const MatrixXd C = roots.asDiagonal() * problem.common_um;
-  const MatrixXd by_traction = rows.common_in(problem.response_um_per_kPa);
+  const inverse::Rows rows = rows_of(problem, found.weighing.by_row);
+  const MatrixXd by_traction = rows.beside_in(problem.response_um_per_kPa);
   const MatrixXd covariance =
-      numerics::plus_product(found.variance * numerics::inverse_symmetric(numerics::small_transposed_product(C, C)),
+      numerics::plus_product(found.variance * rows.covariance_beside(),
                              numerics::small_product(by_traction, found.covariance_kPa2), by_traction.transpose());
   const VectorXd left_um =
       numerics::minus_matvec(problem.displacement_um(), problem.response_um_per_kPa, found.traction_kPa);
-  return CommonMotionInSpace{rows.common_in(left_um), covariance.diagonal().cwiseMax(0).cwiseSqrt()};
+  return CommonMotionInSpace{rows.beside_in(left_um), covariance.diagonal().cwiseMax(0).cwiseSqrt()};
 }
 
 Effect common_motion_effect(Switch setting, const Problem& problem, const std::optional<CommonMotionInSpace>& found) {

@@ -1,12 +1,12 @@
 /// Beads in a gel as the answer to tractions on its surface, as numbers.
 #pragma once
 
-#include <Eigen/Core>
 #include <memory>
 #include <optional>
 
+#include "mbtfm/inverse/rows.h"
+#include "mbtfm/inverse/spectrum.h"
 #include "mbtfm/spatial/observed.h"
-#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/figures.h"
 #include "substrate/compliance.h"
@@ -83,42 +83,23 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
 
 /// Least squares of the weighed beads over the unknowns of a basis, the common motion found besides.
 /// @param response  of the beads to them
-tractions::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
-                                double n_data, int threads);
+inverse::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
+                              double n_data, int threads);
 
-// What the beads say, weighed, and what they say of tractions alone.
-
-struct Observed;
-struct Problem;
 struct SpatialReconstruction;
 
 /// Shift along each axis that the beads have (um) and turn about z (rad), of unit size, as rows of `observed`. A stage
 /// that moved between two stacks and a dish that was put back do this to all beads, and where a cell fills the view
 /// their tracker cannot tell it from what the cell does.
-Eigen::MatrixXd common_motions(const Observed& observed);
+MatrixXd common_motions(const Observed& observed);
 
-/// P W S: rows over their standard errors (S) and by the roots of the loss's weights (W), and with the common motions C
-/// as further unknowns, of any size: P = 1 − Q Qᵀ, Q an orthonormal basis of W S C (Frisch & Waugh, Econometrica 1
-/// (1933) 387).
-class Rows {
- public:
-  Rows(const Problem& problem, const Eigen::VectorXd& weights_by_row);
-
-  Eigen::MatrixXd of(const Eigen::MatrixXd& by_row) const;
-  Eigen::MatrixXd transposed(const Eigen::MatrixXd& weighed) const;
-  /// The sizes of the common motions that explain rows best: motions × columns.
-  Eigen::MatrixXd common_in(const Eigen::MatrixXd& by_row) const;
-  Eigen::Index n_common() const { return common_.cols(); }
-
- private:
-  Eigen::VectorXd roots_;
-  Eigen::MatrixXd weighed_common_;  ///< W S C
-  Eigen::MatrixXd common_;          ///< Q
-};
+/// The beads' rows with weights W S: over their standard errors (S) and by the roots of the loss's weights (W). The
+/// common motions are beside, and these columns.
+inverse::Rows rows_of(const Problem& problem, const VectorXd& weights_by_row, const MatrixXd& columns = {});
 
 /// The motion that was found beside tractions, in the order of common_motions().
 struct CommonMotionInSpace {
-  Eigen::VectorXd values, sigma;
+  VectorXd values, sigma;
 };
 /// None where the problem has no common motions, or the reconstruction no standard errors.
 std::optional<CommonMotionInSpace> common_motion_beside(const Problem& problem, const SpatialReconstruction& found);

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <numeric>
 
+#include "mbtfm/inverse/spectrum.h"
 #include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/reconstruction.h"
 #include "mbtfm/spatial/traction_mesh.h"
-#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
@@ -89,28 +91,16 @@ void find_doubts(const Problem& problem, const SpatialParameters& parameters, Sp
 tractions::TractionMethod checked_method(const tractions::TractionParameters& traction, const SpatialInputs& inputs) {
   using enum TractionMethod;
   const TractionMethod method = traction.method.value_or(inputs.adhesions.empty() ? tikhonov : group_l1);
-  switch (method) {
-    case fttc:
-    case sparse:
-    case trpf:
-    case bem:
-    case adhesion_forces:
-      throw UsageError(std::string(name_of(method)) +
-                       " takes beads that a flat surface moves along itself, and these are in space: choose tikhonov, "
-                       "group-l1 or patches");
-    case patches:
-      if (inputs.adhesions.empty()) throw UsageError("patches: --adhesions is missing or holds none");
-      return method;
-    case group_l1:
-      if (traction.lambda_um_per_kPa) {
-        throw UsageError(
-            "group-l1: lambda_um_per_kPa belongs to the other methods; this one has a penalty of its own, at which the "
-            "misfit is what the noise leaves");
-      }
-      return method;
-    default:
-      return method;
-  }
+  if (tractions::flat_method(method))
+    throw UsageError(std::string(name_of(method)) +
+                     " takes beads that a flat surface moves along itself, and these are in space: choose tikhonov, "
+                     "group-l1 or patches");
+  if (method == patches && inputs.adhesions.empty()) throw UsageError("patches: --adhesions is missing or holds none");
+  if (method == group_l1 && traction.lambda_um_per_kPa)
+    throw UsageError(
+        "group-l1: lambda_um_per_kPa belongs to the other methods; this one has a penalty of its own, at which the "
+        "misfit is what the noise leaves");
+  return method;
 }
 
 SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& inputs,
@@ -155,9 +145,18 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
 
 namespace {
 
+/// Of rows with these weights, for all lambdas.
+template <class Solver>
+struct Scanned {
+  std::shared_ptr<const Solver> solver;  ///< inverse::Spectrum, or without a matrix inverse::Recurrences
+  inverse::LambdaScan scan;
+};
+template <class Solver>
+using Scan = std::function<Scanned<Solver>(const Weighing& weighing)>;
+
+template <class Solver>
 struct Fit {
-  std::optional<tractions::Spectrum> spectrum;
-  tractions::LambdaScan scan;
+  Scanned<Solver> scanned;
   ChosenLambda chosen;
   VectorXd x;
   Weighing weighing;
@@ -170,14 +169,15 @@ std::optional<double> largest(std::optional<double> a, std::optional<double> b) 
 SpatialReconstruction reconstruction_of_nothing(const Problem& problem) {
   SpatialReconstruction r;
   r.traction_kPa = VectorXd::Zero(problem.n_unknowns());
+  if (!problem.map) r.resolved = VectorXd::Zero(problem.mesh.n_vertices());
   r.remark = "no bead has moved: there is no traction";
   return r;
 }
 
 /// P W S G L and its transpose, by solutions of the gel.
-tractions::LinearMap map_of(const Problem& problem, const Basis& basis, const Rows& rows) {
+inverse::LinearMap map_of(const Problem& problem, const Basis& basis, const inverse::Rows& rows) {
   const Index n_points = problem.map->rows(), n = problem.observed.n_components();
-  tractions::LinearMap map;
+  inverse::LinearMap map;
   map.n_data = problem.observed.displacement_um.size();
   map.n_unknowns = 3 * basis.size();
   map.forward = [&problem, &basis, &rows](const MatrixXd& x) -> MatrixXd {
@@ -212,13 +212,13 @@ std::optional<double> stated_variance(const Problem& problem, BeadLoss loss, con
   return least > 0 ? std::optional(least) : std::nullopt;
 }
 
-ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction, RiskIs risk_is) {
-  using enum tractions::LambdaCriterion;
+ChosenLambda choose_lambda(const Problem& problem, const inverse::LambdaScan& scan,
+                           const tractions::TractionParameters& traction, RiskCriterion risk_criterion) {
+  using enum inverse::LambdaCriterion;
   const double unit = lambda_per_um_per_kPa(problem);
   if (traction.lambda_um_per_kPa) return {*traction.lambda_um_per_kPa * unit, {}, {}};
-  const tractions::LambdaCriterion by =
-      traction.lambda_by == risk && risk_is == RiskIs::unsound ? gcv : traction.lambda_by;
+  const inverse::LambdaCriterion by =
+      traction.lambda_by == risk && risk_criterion == RiskCriterion::use_gcv ? gcv : traction.lambda_by;
   if (by != risk) return {chosen_lambda(scan, by), by, {}};
   ChosenLambda chosen{scan.by_risk, by, {}};
   chosen.finding = noticed(Symptom::lambda_runs_away, scan.by_evidence / scan.by_risk);
@@ -229,121 +229,123 @@ ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& 
   return chosen;
 }
 
-SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
-                                     const tractions::TractionParameters& traction, const SpatialParameters& parameters,
-                                     int threads) {
-  SpatialReconstruction r;
+namespace {
+
+template <class Solver>
+struct Settled {
+  Fit<Solver> fit;
+  SpatialReconstruction found;  ///< without covariance
+};
+
+/// From least squares to the loss that is asked for, until the tractions stay.
+/// @param scan  @param displaced  rows by the unknowns of the basis (um)
+template <class Solver>
+Settled<Solver> settled(const Problem& problem, const Basis& basis, const tractions::TractionParameters& traction,
+                        BeadLoss loss, const Scan<Solver>& scan,
+                        const std::function<VectorXd(const VectorXd&)>& displaced) {
   const Observed& observed = problem.observed;
-  const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
-  const RiskIs risk_is = weighs_by_residual(parameters.loss) ? RiskIs::unsound : RiskIs::sound;
-  const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
-    return spectrum.scan(largest(stated_variance(problem, parameters.loss, weighing), spectrum.variance_felt_least()),
-                         tractions::SignalIn::told);
-  };
+  const std::vector<double> good = probabilities_of_good(loss, observed);
+  const bool is_large = problem.map != nullptr;
   // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
   // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.
   const auto fit = [&](Weighing weighing, const std::optional<Weighing>& judged = {}) {
-    Fit made;
-    made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
-    made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
-                       : scanned(*made.spectrum, weighing);
-    made.chosen = choose_lambda(problem, made.scan, traction, risk_is);
+    Fit<Solver> made;
+    made.scanned = scan(weighing);
+    if (judged) made.scanned.scan = scan(*judged).scan;
+    made.chosen = choose_lambda(problem, made.scanned.scan, traction,
+                                weighs_by_residual(loss) || is_large ? RiskCriterion::use_gcv : RiskCriterion::usable);
     if (judged && made.chosen.by)
       made.chosen.lambda *= std::sqrt(weighing.variance / judged->variance);  // the same prior
-    made.x = made.spectrum->solve(made.chosen.lambda);
+    made.x = made.scanned.solver->solve(made.chosen.lambda);
     made.weighing = std::move(weighing);
     return made;
   };
   const VectorXd displacement_um = problem.displacement_um();
-  const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
-  const auto residual = [&](const Fit& made) {
-    return problem.over_errors(displacement_um - response * made.x, made.weighing.by_row);
+  const auto residual = [&](const Fit<Solver>& made) {
+    return problem.over_errors(displacement_um - displaced(made.x), made.weighing.by_row);
   };
-  if (displacement_um.isZero(0)) {
-    r = reconstruction_of_nothing(problem);
-    r.resolved = VectorXd::Zero(problem.mesh.n_vertices());
-    return r;
-  }
-  Fit last = fit(weigh(BeadLoss::l2, observed, of_nothing, 0));
-  const auto settle = [&](BeadLoss loss) {
-    constexpr int kMostRounds = 12;
+  const auto degrees = [](const Fit<Solver>& made) { return made.scanned.solver->degrees(made.chosen.lambda); };
+  std::vector<BeadLoss> in_turn;
+  if (loss == BeadLoss::biweight) in_turn.push_back(BeadLoss::huber);  // as inverse::in_turn()
+  if (loss != BeadLoss::l2) in_turn.push_back(loss);
+  Fit<Solver> last = fit(weigh(BeadLoss::l2, observed, displacement_um.cwiseQuotient(observed.sigma_um), 0));
+  for (const BeadLoss step : in_turn) {
     constexpr double kSettled = 0.005;
+    const int most_rounds = !weighs_by_residual(step) ? 1 : is_large ? 4 / static_cast<int>(in_turn.size()) : 12;
     double change = 1;
-    for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
+    for (int round = 0; round < most_rounds && change > kSettled; ++round) {
       const VectorXd left = residual(last);
-      const double degrees = last.spectrum->degrees(last.chosen.lambda);
       std::optional<Weighing> judged;
-      if (weighs_by_residual(loss) && loss != BeadLoss::biweight)
-        judged = weigh(BeadLoss::biweight, observed, left, degrees);
-      Fit next = fit(weigh(loss, observed, left, degrees, good), judged);
+      if (!is_large && weighs_by_residual(step) && step != BeadLoss::biweight)
+        judged = weigh(BeadLoss::biweight, observed, left, degrees(last));
+      Fit<Solver> next = fit(weigh(step, observed, left, degrees(last), good), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
       last = std::move(next);
     }
-  };
-  // biweight has several minima: from huber's, the only one
-  if (parameters.loss == BeadLoss::biweight) settle(BeadLoss::huber);
-  if (parameters.loss != BeadLoss::l2) settle(parameters.loss);
-  const double lambda = last.chosen.lambda;
-  r.degrees = last.spectrum->degrees(lambda);
-  r.weighing = weigh(parameters.loss, observed, residual(last), r.degrees, good);
-  r.variance = std::max(weighs_by_residual(parameters.loss) ? r.weighing.variance : last.scan.variance,
-                        problem.least_variance());
-  const double loose = last.scan.by_gcv;
-  const double n_data = last.weighing.n_data;  // less where weights are small; a tenth at least is left, as in `weigh`
-  r.variance_left = last.spectrum->misfit(loose) / std::max(n_data - last.spectrum->degrees(loose), 0.1 * n_data);
-  r.traction_kPa = basis.tractions(last.x);
-  r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(lambda, r.variance), threads);
-  if (last.chosen.by == tractions::LambdaCriterion::risk) {
-    const double of_sums = last.scan.by_prediction;
-    r.summands = Summands{basis.tractions(last.spectrum->solve(of_sums)),
-                          basis.covariance(last.spectrum->posterior(of_sums, r.variance), threads), of_sums};
   }
-  r.scan = std::move(last.scan);
-  r.lambda = lambda;
+  SpatialReconstruction r;
+  r.lambda = last.chosen.lambda;
   r.lambda_by = last.chosen.by;
-  r.findings.push_back(std::move(last.chosen.finding));
-  r.length_um = lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
-  r.relative_l2 = last.spectrum->relative_l2(lambda);
-  return r;
+  r.findings.push_back(last.chosen.finding);
+  r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
+  r.traction_kPa = basis.tractions(last.x);
+  r.degrees = degrees(last);
+  r.relative_l2 = last.scanned.solver->relative_l2(*r.lambda);
+  r.weighing = weigh(loss, observed, residual(last), r.degrees, good);
+  r.scan = last.scanned.scan;
+  r.variance = std::max(weighs_by_residual(loss) ? r.weighing.variance : r.scan->variance, problem.least_variance());
+  return {std::move(last), std::move(r)};
 }
 
-namespace {
-
-/// The same where the problem has no matrix. No standard errors.
+/// Where the problem has no matrix. No standard errors.
 SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
                                         const SpatialParameters& parameters) {
-  const Observed& observed = problem.observed;
+  if (problem.displacement_um().isZero(0)) return reconstruction_of_nothing(problem);
   const Basis basis = orthonormal_basis(problem.norm_um2());
-  if (observed.displacement_um.isZero(0)) return reconstruction_of_nothing(problem);
-  SpatialReconstruction r;
-  // as reconstruct_in() has it: from least squares, and to biweight by way of huber
-  const std::vector<double> good = probabilities_of_good(parameters.loss, observed);
-  const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : good.empty() ? 5 : 2;
-  r.weighing = weigh(BeadLoss::l2, observed, observed.displacement_um.cwiseQuotient(observed.sigma_um), 0);
-  for (int round = 0; round < n_rounds; ++round) {
-    const Rows rows(problem, r.weighing.by_row);
-    const tractions::Recurrences recurrences(map_of(problem, basis, rows), rows.of(observed.displacement_um), {});
-    r.scan = recurrences.scan(stated_variance(problem, parameters.loss, r.weighing));
-    const ChosenLambda chosen = choose_lambda(problem, *r.scan, traction, RiskIs::unsound);
-    r.lambda = chosen.lambda;
-    r.lambda_by = chosen.by;
-    r.findings = {chosen.finding};
-    r.traction_kPa = basis.tractions(recurrences.solve(*r.lambda));
-    r.degrees = recurrences.degrees(*r.lambda);
-    r.relative_l2 = recurrences.relative_l2(*r.lambda);
-    const bool is_on_its_way = parameters.loss == BeadLoss::biweight && round < 2;
-    r.weighing = weigh(is_on_its_way ? BeadLoss::huber : parameters.loss, observed,
-                       problem.residual(r.traction_kPa, r.weighing.by_row), r.degrees, good);
-  }
-  r.variance =
-      std::max(weighs_by_residual(parameters.loss) ? r.weighing.variance : r.scan->variance, problem.least_variance());
-  r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
+  const Scan<inverse::Recurrences> scan = [&](const Weighing& weighing) {
+    const inverse::Rows rows = rows_of(problem, weighing.by_row);
+    const auto recurrences = std::make_shared<const inverse::Recurrences>(
+        map_of(problem, basis, rows), rows.of(problem.displacement_um()), inverse::RecurrenceOptions{});
+    return Scanned<inverse::Recurrences>{recurrences,
+                                         recurrences->scan(stated_variance(problem, parameters.loss, weighing))};
+  };
+  SpatialReconstruction r =
+      settled<inverse::Recurrences>(
+          problem, basis, traction, parameters.loss, scan,
+          [&](const VectorXd& x) -> VectorXd { return problem.at_beads(problem.map->displace(basis.tractions(x))); })
+          .found;
   r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +
              std::to_string(problem.mesh.n_vertices());
   return r;
 }
 
 }  // namespace
+
+SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
+                                     const tractions::TractionParameters& traction, const SpatialParameters& parameters,
+                                     int threads) {
+  if (problem.displacement_um().isZero(0)) return reconstruction_of_nothing(problem);
+  const Scan<inverse::Spectrum> scan = [&](const Weighing& weighing) {
+    const auto spectrum = std::make_shared<const inverse::Spectrum>(
+        spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
+    const auto stated = stated_variance(problem, parameters.loss, weighing);
+    return Scanned<inverse::Spectrum>{
+        spectrum, spectrum->scan(largest(stated, spectrum->variance_felt_least()), inverse::SignalIn::resolved)};
+  };
+  auto [fit, r] = settled<inverse::Spectrum>(problem, basis, traction, parameters.loss, scan,
+                                             [&](const VectorXd& x) -> VectorXd { return response * x; });
+  const inverse::Spectrum& spectrum = *fit.scanned.solver;
+  const double loose = r.scan->by_gcv;
+  const double n_data = fit.weighing.n_data;  // less where weights are small; a tenth at least is left, as in `weigh`
+  r.variance_left = spectrum.misfit(loose) / std::max(n_data - spectrum.degrees(loose), 0.1 * n_data);
+  r.covariance_kPa2 = basis.covariance(spectrum.posterior(*r.lambda, r.variance), threads);
+  if (r.lambda_by == inverse::LambdaCriterion::risk) {
+    const double of_sums = r.scan->by_prediction;
+    r.summands = Summands{basis.tractions(spectrum.solve(of_sums)),
+                          basis.covariance(spectrum.posterior(of_sums, r.variance), threads), of_sums};
+  }
+  return std::move(r);
+}
 
 SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractions::TractionParameters& traction,
                                            const SpatialParameters& parameters, int threads) {

@@ -42,13 +42,13 @@ struct SpatialReconstruction {
   MatrixXd covariance_kPa2;
   std::optional<Summands> summands;  ///< unset: the map's
   VectorXd resolved;                 ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
-  std::optional<tractions::LambdaScan> scan;
-  std::optional<double> lambda;                         ///< of |S (u − G t)|² + lambda² |s|²
-  std::optional<double> length_um;                      ///< lambda times E, the same for every method
-  std::optional<tractions::LambdaCriterion> lambda_by;  ///< what chose lambda in the end; none: it was given
-  double degrees = 0;                                   ///< how many numbers the beads tell
-  double relative_l2 = 0;                               ///< |S (u − G t)| / |S u|, weighed by the loss
-  double noise_um = 0;                                  ///< along the surface, as the beads have it
+  std::optional<inverse::LambdaScan> scan;
+  std::optional<double> lambda;                       ///< of |S (u − G t)|² + lambda² |s|²
+  std::optional<double> length_um;                    ///< lambda times E, the same for every method
+  std::optional<inverse::LambdaCriterion> lambda_by;  ///< what chose lambda in the end; none: it was given
+  double degrees = 0;                                 ///< how many numbers the beads tell
+  double relative_l2 = 0;                             ///< |S (u − G t)| / |S u|, weighed by the loss
+  double noise_um = 0;                                ///< along the surface, as the beads have it
   double chi_squared = 0;  ///< misfit over what the stated errors leave, per datum; 0: not stated
   Weighing weighing;
   double variance = 1;       ///< of one datum as weighed, in units of sigma²
@@ -90,22 +90,22 @@ std::optional<double> stated_variance(const Problem& problem, BeadLoss loss, con
 
 struct ChosenLambda {
   double lambda = 0;
-  std::optional<tractions::LambdaCriterion> by;  ///< none: given
-  std::optional<Finding> finding;                ///< where it is not the criterion that was asked for
+  std::optional<inverse::LambdaCriterion> by;  ///< none: given
+  std::optional<Finding> finding;              ///< where it is not the criterion that was asked for
 };
-/// What the risk is worth.
-enum class RiskIs {
-  sound,
+/// Whether the criterion `risk` can be used.
+enum class RiskCriterion {
+  usable,
   /// Cross-validation's lambda is taken. With a robust loss weights hang on the residuals, so that what they leave of
   /// large displacements looks like noise to the risk. With traces from random signs it divides their errors by
   /// lambda². It then smooths most tractions away.
-  unsound
+  use_gcv
 };
 /// The one that is given, or by the criterion. Where the risk's is below half of the evidence's, the evidence's:
 /// tractions then follow beads that are astray, or what the model has wrong, and the risk has no minimum but the end of
 /// the scan. The finding says so.
-ChosenLambda choose_lambda(const Problem& problem, const tractions::LambdaScan& scan,
-                           const tractions::TractionParameters& traction, RiskIs risk_is);
+ChosenLambda choose_lambda(const Problem& problem, const inverse::LambdaScan& scan,
+                           const tractions::TractionParameters& traction, RiskCriterion risk_criterion);
 
 /// With so many tractions that the problem has no matrix: without standard errors.
 SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractions::TractionParameters& traction,

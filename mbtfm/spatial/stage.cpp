@@ -35,8 +35,8 @@ void write_scan(stage::StageContext& context, const SpatialReconstruction& r, do
   shown.lambda = *r.length_um / youngs_modulus_kPa;
   shown.length_um = r.length_um;
   const double unit = *shown.lambda / *r.lambda;
-  tractions::LambdaScan& scan = *shown.scan;
-  for (tractions::ScanPoint& point : scan.points) point.lambda *= unit;
+  inverse::LambdaScan& scan = *shown.scan;
+  for (inverse::ScanPoint& point : scan.points) point.lambda *= unit;
   for (double* by : {&scan.by_gcv, &scan.by_evidence, &scan.by_risk, &scan.by_prediction}) *by *= unit;
   for (std::optional<double>* by : {&scan.by_l_curve, &scan.by_discrepancy}) {
     if (*by) **by *= unit;

@@ -21,12 +21,6 @@ Vector3d vector(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 Vec3 errors_of(const Matrix3d& covariance) { return vec(covariance.diagonal().cwiseMax(0).cwiseSqrt()); }
 
-/// Standard deviation of a vector along itself.
-double error_along(const Vector3d& v, const Matrix3d& covariance) {
-  const Vector3d along = v.norm() > 0 ? Vector3d(v.normalized()) : Vector3d::UnitX();
-  return std::sqrt(std::max(0.0, along.dot(covariance * along)));
-}
-
 }  // namespace
 
 VectorXd resolved_shares(const MatrixXd& covariance, const MatrixXd& precision_before) {
@@ -64,13 +58,14 @@ std::vector<PartForce> parts_of(const Problem& problem, const MatrixXd& areas_um
 void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covariance_nN2) {
   part.force_nN = vec(force_nN);
   part.sigma_nN = errors_of(covariance_nN2);
-  part.magnitude_sigma_nN = error_along(force_nN, covariance_nN2);
+  part.magnitude_sigma_nN = inverse::error_along(force_nN, covariance_nN2);
   constexpr double kOfAny_deg = 180 / std::numbers::sqrt3, kDegrees = 180 / std::numbers::pi;
   const Vector3d across(-force_nN.y(), force_nN.x(), 0);
   const double lateral_nN = across.norm();
   part.angle_deg = kDegrees * std::atan2(force_nN.y(), force_nN.x());
   part.angle_sigma_deg =
-      lateral_nN > 0 ? std::min(kOfAny_deg, kDegrees * error_along(across, covariance_nN2) / lateral_nN) : kOfAny_deg;
+      lateral_nN > 0 ? std::min(kOfAny_deg, kDegrees * inverse::error_along(across, covariance_nN2) / lateral_nN)
+                     : kOfAny_deg;
 }
 
 }  // namespace
@@ -78,7 +73,7 @@ void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covari
 std::optional<double> chi_squared_of_flipped_z(const Problem& problem, const SpatialReconstruction& r) {
   const Index n = problem.observed.n_components();
   if (n < 3 || r.covariance_kPa2.size() == 0 || !(r.variance > 0)) return std::nullopt;
-  const Rows rows(problem, r.weighing.by_row);
+  const inverse::Rows rows = rows_of(problem, r.weighing.by_row);
   const auto chi_squared = [&](const VectorXd& displacement_um) {
     const VectorXd u = rows.of(displacement_um);
     const VectorXd pulled = numerics::transposed_matvec(problem.response_um_per_kPa, rows.transposed(u));
@@ -100,7 +95,7 @@ const MatrixXd& covariance_of_summed_kPa2(const SpatialReconstruction& r) {
 
 std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
                                                 const SpatialReconstruction& r, int threads) {
-  const Rows rows(problem, r.weighing.by_row);
+  const inverse::Rows rows = rows_of(problem, r.weighing.by_row);
   const MatrixXd A = rows.of(background), P = rows.of(problem.patch_response_um_per_nN);
   const VectorXd u = rows.of(problem.displacement_um());
   MatrixXd inner = MatrixXd::Zero(A.cols(), A.cols());
@@ -198,8 +193,8 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& r) {
     const Matrix3d of_force = of_net.topLeftCorner<3, 3>(), of_moment = of_net.bottomRightCorner<3, 3>();
     balance.force_sigma_nN = errors_of(of_force);
     balance.moment_sigma_nN_um = errors_of(of_moment);
-    balance.net_force_sigma_nN = error_along(net.head<3>(), of_force);
-    balance.net_moment_sigma_nN_um = error_along(net.tail<3>(), of_moment);
+    balance.net_force_sigma_nN = inverse::error_along(net.head<3>(), of_force);
+    balance.net_moment_sigma_nN_um = inverse::error_along(net.tail<3>(), of_moment);
     balance.imbalance = net.dot(VectorXd(numerics::solve_symmetric(of_net, net)));
     balance.contractile_moment_sigma_nN_um = std::sqrt(std::max(0.0, inwards.dot(covariance * inwards)));
   }

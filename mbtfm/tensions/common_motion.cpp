@@ -12,18 +12,6 @@
 
 namespace mbtfm::tensions {
 
-MatrixXd affine_motions(const DisplacementField& beads) {
-  const std::vector<Vec2> places_um = points_of(beads);
-  const Vec2 centre = centre_of(places_um);
-  MatrixXd motions(2 * static_cast<Index>(beads.size()), 6);
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    const Vec2 d = places_um[i] - centre;
-    motions.middleRows<2>(2 * static_cast<Index>(i)) << 1, 0, -d.y, d.x, d.x, d.y,  //
-        0, 1, d.x, d.y, -d.y, d.x;
-  }
-  return motions;
-}
-
 namespace {
 
 /// 2·beads × 14, about the beads' centre and of size 1 or so.

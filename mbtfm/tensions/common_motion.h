@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/inverse/rows.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/figures.h"
@@ -28,9 +29,7 @@ Vec2 centre_of(const Things& things, Place place = {}) {
   return (1 / std::max<double>(1, static_cast<double>(things.size()))) * sum;
 }
 
-/// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
-/// (relative).
-MatrixXd affine_motions(const DisplacementField& beads);
+using inverse::affine_motions;
 
 /// How much of each motion the fit finds besides, with standard errors; in the order of the data's motions.
 struct MotionsBeside {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbtfm/inverse/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
 
@@ -116,13 +117,11 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   data.n_used = -data.motions.shapes.cols();
   data.has_errors = state_errors(beads);
   data.position_um = points_of(beads);
-  data.displacement_um.resize(n_rows);
+  data.displacement_um = inverse::components_of(beads);
   data.weight_per_um = VectorXd::Zero(n_rows);
   for (std::size_t i = 0; i < beads.size(); ++i) {
-    const Index row = 2 * static_cast<Index>(i);
-    data.displacement_um.segment<2>(row) << beads[i].displacement_um.x, beads[i].displacement_um.y;
     if (!is_used.empty() && !is_used[i]) continue;
-    data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);
+    data.weight_per_um.segment<2>(2 * static_cast<Index>(i)).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);
     data.n_used += 2;
   }
   data.response = std::move(response);

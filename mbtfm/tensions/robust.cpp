@@ -6,16 +6,11 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
-#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
 
 namespace {
-
-constexpr double kHuber = 1.500, kTukey = 5.123;  // see robust_weight
-// An L1 weight grows without bound at zero; below a hundredth of the noise a residual is as good as none.
-constexpr double kSmallest = 0.01;
 
 /// Length of each bead's residual, of the beads in use.
 std::vector<double> used_lengths(const LinearData& data, const VectorXd& residual) {
@@ -93,7 +88,7 @@ VectorXd times(const BeadJacobian& J, const VectorXd& s, int threads) {
 VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian& J, const VectorXd& low, double scale,
                         int threads) {
   VectorXd step = VectorXd::Zero(J.cols());
-  VectorXd weights = robust_weights(loss, residual, scale);
+  VectorXd weights = inverse::weights_of(loss, residual, scale, 2);
   constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
   for (int i = 0; i < kMaxSteps; ++i) {
     auto [H, b] = normal_equations(J, weights, residual, threads);
@@ -101,7 +96,7 @@ VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian&
     const VectorXd next = bounded_quadratic_minimum(H, -b, low);
     const double change = (next - step).norm();
     step = next;
-    weights = robust_weights(loss, residual - times(J, step, threads), scale);
+    weights = inverse::weights_of(loss, residual - times(J, step, threads), scale, 2);
     if (change <= 1e-4 * step.norm()) break;
   }
   return weights;
@@ -241,62 +236,29 @@ double harm_done_by(const std::vector<Index>& strays, const LinearData& data, co
   return std::max(most_moved, widened);
 }
 
-double robust_weight(Loss loss, double residual) {
-  switch (loss) {
-    case Loss::squares:
-      return 1;
-    case Loss::huber:
-      return residual <= kHuber ? 1 : kHuber / residual;
-    case Loss::tukey:
-      return residual < kTukey ? std::pow(1 - std::pow(residual / kTukey, 2), 2) : 0;
-    case Loss::l1:
-      return 1 / std::max(residual, kSmallest);
-  }
-  throw InternalError("unknown loss");
-}
-
-VectorXd robust_weights(Loss loss, const VectorXd& residual, double scale) {
-  VectorXd weights(residual.size() / 2);
-  for (Index i = 0; i < weights.size(); ++i) {
-    weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
-  }
-  return weights;
-}
-
 double robust_scale(const LinearData& data, const VectorXd& weighted_residual) {
-  std::vector<double> lengths = used_lengths(data, weighted_residual);
-  return lengths.empty() ? 0 : numerics::median_in(lengths) / std::sqrt(2 * std::log(2.0));
+  return inverse::scale_of(used_lengths(data, weighted_residual), 2);
 }
 
 WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, const std::vector<int>& adhesion_ids,
                           const FitParameters& parameters, Loss loss, int threads, TensionFit first) {
-  const Loss begin = loss == Loss::tukey ? Loss::huber : loss;
-  auto [fit, weighed] =
-      fit_with_loss(std::move(data), network, adhesion_ids, parameters, threads, std::move(first), begin, {});
-  if (loss != Loss::tukey) return {std::move(fit), std::move(weighed)};
-  const double scale = robust_scale(weighed, weighted_residual(weighed, fit.trial.forces_nN));
-  return fit_with_loss(std::move(weighed), network, adhesion_ids, parameters, threads, std::move(fit), Loss::tukey,
-                       scale);
+  WeighedFit found{std::move(first), std::move(data)};
+  for (const Loss step : inverse::in_turn(loss)) {
+    std::optional<double> scale;
+    if (step == Loss::tukey) scale = robust_scale(found.data, weighted_residual(found.data, found.fit.trial.forces_nN));
+    found = fit_with_loss(std::move(found.data), network, adhesion_ids, parameters, threads, std::move(found.fit), step,
+                          scale);
+  }
+  return found;
 }
 
 double misfit_variance(const LinearData& data, const VectorXd& forces_nN, Index n_tensions, Loss loss) {
   const VectorXd residual = weighted_residual(data, forces_nN);
   const auto degrees = static_cast<double>(std::max<Index>(1, data.n_used - n_tensions));
   double variance = residual.squaredNorm() / degrees;
-  const double scale = robust_scale(data, residual);
-  if (loss != Loss::squares && scale > 0) {
-    double psi_squared = 0, slope = 0, weight = 0;
-    const std::vector<double> lengths = used_lengths(data, residual);
-    for (const double length : lengths) {
-      const double r = length / scale, w = robust_weight(loss, r);
-      constexpr double kStep = 1e-4;  // psi' by differences: psi is smooth but for one kink
-      const double above = (r + kStep) * robust_weight(loss, r + kStep);
-      psi_squared += w * w * r * r / 2;
-      slope += ((above - w * r) / kStep + w) / 2;
-      weight += w;
-    }
-    variance = scale * scale * psi_squared / (slope * slope) * weight;
-  }
+  const std::vector<double> lengths = used_lengths(data, residual);
+  const double scale = inverse::scale_of(lengths, 2);
+  if (loss != Loss::squares && scale > 0) variance = inverse::estimator_of(loss, lengths, scale, 2).variance;
   return data.has_errors ? std::max(1.0, variance) : variance;
 }
 

@@ -1,5 +1,4 @@
-/// Robust losses (thesis 2.3.2): sum of rho(|r_b| / s) over beads b instead of the sum of squares, so that a few bad
-/// beads cannot pull the tensions away. By iterative reweighting: w(r) = rho'(r) / r.
+/// Tensions by a robust loss (thesis 2.3.2): by iterative reweighting. See mbtfm/inverse/loss.h.
 #pragma once
 
 #include <optional>
@@ -38,17 +37,7 @@ std::vector<Index> stray_beads(const LinearData& data, const Studentized& beads)
 double harm_done_by(const std::vector<Index>& strays, const LinearData& data, const VectorXd& weighted_residual,
                     const MatrixXd& force_derivatives);
 
-/// Weight of a bead whose residual has this size, in robust standard deviations; 1 at zero (l1: large there).
-/// squares 1 | huber min(1, k/r), k = 1.500 | tukey (1 − (r/c)²)², c = 5.123 | l1 1/r.
-/// k and c keep 95 % efficiency where the noise is Gaussian in the plane (Maronna, Martin & Yohai, Robust Statistics,
-/// 2006, 6.4, solved for two dimensions); l1 keeps 79 %. A bead's residual is a vector: the weight follows its length,
-/// so that nothing depends on the axes.
-double robust_weight(Loss loss, double residual);
-
-/// By bead, of its residual. @param residual  2·beads  @param scale  standard deviation of a component
-VectorXd robust_weights(Loss loss, const VectorXd& residual, double scale);
-
-/// Standard deviation of a component that the middle of the residuals tells: median of |r_b| / 1.1774 (Rayleigh).
+/// inverse::scale_of() of the beads in use.
 double robust_scale(const LinearData& data, const VectorXd& weighted_residual);
 
 /// The last fit, and the data with the weights that it was made with.
@@ -56,16 +45,15 @@ struct WeighedFit {
   TensionFit fit;
   LinearData data;
 };
-/// Weigh the beads by the residuals of a fit, fit on this network again, until the tensions stay. Tukey's loss, which
-/// has several minima, starts from Huber's.
+/// Weigh the beads by the residuals of a fit, fit on this network again, until the tensions stay. Tukey's loss keeps
+/// the scale of Huber's, at whose fit it begins.
 /// @param loss  all but squares
 /// @param first  the fit by least squares
 WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, const std::vector<int>& adhesion_ids,
                           const FitParameters& parameters, Loss loss, int threads, TensionFit first);
 
 /// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where
-/// the beads state their errors; else the same from the asymptotic variance of the loss (Maronna et al., 10.3):
-/// s² E(psi²/2) E(w) / E((psi' + psi/r)/2)², E the mean over the beads.
+/// the beads state their errors; else the same from inverse::estimator_of().
 double misfit_variance(const LinearData& data, const VectorXd& forces_nN, Index n_tensions, Loss loss);
 
 }  // namespace mbtfm::tensions

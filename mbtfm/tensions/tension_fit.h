@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/inverse/loss.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "network/contractile.h"
 #include "pipeline/contract/report.h"
@@ -96,9 +97,7 @@ enum class Gradients {
 };
 constexpr auto words(Gradients) { return std::array{"exact", "finite-difference"}; }
 
-/// What a bead's residual costs: see robust.h.
-enum class Loss { squares, huber, tukey, l1 };
-constexpr auto words(Loss) { return std::array{"squares", "huber", "tukey", "l1"}; }
+using inverse::Loss;
 
 /// How a trial's displacements come about.
 enum class TrialDisplacement {

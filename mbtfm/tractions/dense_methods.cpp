@@ -2,6 +2,7 @@
 /// cell (Dembo & Wang, Biophys. J. 76 (1999) 2307), both with a Tikhonov penalty.
 #include <cmath>
 
+#include "mbtfm/inverse/rows.h"
 #include "mbtfm/tractions/dense_problem.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
@@ -92,8 +93,8 @@ void state_errors(const Loads& loads, const MatrixXd& sums, std::vector<Adhesion
   const MatrixXd missed =
       numerics::small_product(sums, loads.response) - MatrixXd::Identity(sums.rows(), loads.response.cols());
   for (std::size_t a = 0; a < forces.size(); ++a) {
-    const Vec2 along = direction_of(forces[a].force_nN);
-    const Eigen::RowVector2d e(along.x, along.y);
+    const Eigen::RowVector2d e =
+        inverse::direction_of(Eigen::Vector2d(forces[a].force_nN.x, forces[a].force_nN.y)).transpose();
     const auto row = 2 * static_cast<Index>(a);
     double variance = (e * covariance.block<2, 2>(row, row) * e.transpose()).value();
     for (std::size_t b = 0; b < forces.size(); ++b) {
@@ -141,15 +142,11 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
                     .truth = even_forces(inputs, *gel),
                     .n_adhesions = points.size()};
   const Loads loads = regularised(inputs, parameters, model, inputs.gel.youngs_modulus_kPa * std::sqrt(area), r);
+  r.forces = forces_with_errors(inputs.adhesions, loads.values, loads.covariance);
   std::vector<Vec2> forces;
-  for (std::size_t a = 0; a < points.size(); ++a) forces.push_back(loads.at(a));
+  for (const AdhesionForce& f : r.forces) forces.push_back(f.force_nN);
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const Adhesion& adhesion = inputs.adhesions[a];
-    r.forces.push_back({.adhesion_id = adhesion.adhesion_id,
-                        .force_nN = forces[a],
-                        .sigma_nN = {},
-                        .connected = false,
-                        .moment_nN_um = 0});
     // a point yields without end: the work is that of the force spread over its adhesion, at its centre
     const std::vector<Vec2> u = gel->displacements_um({adhesion.position_um}, ellipses, forces);
     r.patches.push_back({adhesion.position_um, adhesion.area_um2, 1 / adhesion.area_um2 * forces[a], u.front()});

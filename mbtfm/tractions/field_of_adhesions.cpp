@@ -3,45 +3,25 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/contract/extent.h"
+#include "mbtfm/inverse/loss.h"
+#include "mbtfm/inverse/rows.h"
 #include "pipeline/numerics/dense.h"
-#include "pipeline/numerics/order_statistics.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/models.h"
 
 namespace mbtfm::tractions {
 namespace {
 
-/// Shift, and what changes linearly over the field: six columns of order 1.
-MatrixXd affine_motions(const std::vector<Vec2>& places_um) {
-  const auto [low, high] = extent_of(places_um);
-  const double side = std::max({high.x - low.x, high.y - low.y, 1.0});
-  MatrixXd columns = MatrixXd::Zero(2 * std::ssize(places_um), 6);
-  for (Index i = 0; i < std::ssize(places_um); ++i) {
-    const Vec2 at = 2 / side * (places_um[i] - 0.5 * (low + high));
-    columns.row(2 * i) << 1, at.x, at.y, 0, 0, 0;
-    columns.row(2 * i + 1) << 0, 0, 0, 1, at.x, at.y;
-  }
-  return columns;
-}
-
-/// Tukey's, of residuals whose middle tells their scale (Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4); beads
-/// with a flag have none.
-VectorXd weights_of(const VectorXd& residual, const DisplacementField& beads) {
-  constexpr double kTukey = 5.123, kMiddle = 1.1774;  // of a vector in the plane: Rayleigh's median
-  const auto size = [&](std::size_t i) { return residual.segment<2>(2 * static_cast<Index>(i)).norm(); };
-  std::vector<double> sizes;
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    if (beads[i].flag.empty()) sizes.push_back(size(i));
-  }
-  const double scale = std::max(numerics::median(std::move(sizes)) / kMiddle, 1e-12);
-  VectorXd weights = VectorXd::Zero(residual.size());
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    if (!beads[i].flag.empty()) continue;
-    const double r = std::min(1.0, size(i) / (kTukey * scale));
-    weights.segment<2>(2 * static_cast<Index>(i)).setConstant((1 - r * r) * (1 - r * r));
-  }
-  return weights;
+/// Tukey's, of residuals whose median tells their scale (Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4); beads
+/// with a flag have none. By component.
+VectorXd weights_of(const VectorXd& residual, const VectorXd& as_flagged) {
+  const std::vector<double> lengths = inverse::residual_lengths(residual, 2);
+  std::vector<double> good;
+  for (std::size_t i = 0; i < lengths.size(); ++i)
+    if (as_flagged[2 * static_cast<Index>(i)] > 0) good.push_back(lengths[i]);
+  const double scale = std::max(inverse::scale_of(std::move(good), 2), 1e-12);
+  const VectorXd by_bead = inverse::weights_of(inverse::Loss::tukey, residual, scale, 2);
+  return by_bead.transpose().replicate(2, 1).reshaped().cwiseProduct(as_flagged);
 }
 
 /// The sums of shapes that explain the displacements best with these weights; empty where they do not tell.
@@ -71,12 +51,9 @@ FieldOfAdhesions::FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int t
 
 std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
   std::vector<Vec2> places_um = points_of(beads);
-  VectorXd displacement_um(2 * std::ssize(beads)), as_flagged = VectorXd::Zero(displacement_um.size());
-  for (Index i = 0; i < std::ssize(beads); ++i) {
-    const Bead& bead = beads[i];
-    displacement_um.segment<2>(2 * i) << bead.displacement_um.x, bead.displacement_um.y;
-    if (bead.flag.empty()) as_flagged.segment<2>(2 * i).setOnes();
-  }
+  VectorXd displacement_um = inverse::components_of(beads), as_flagged = VectorXd::Zero(displacement_um.size());
+  for (Index i = 0; i < std::ssize(beads); ++i)
+    if (beads[i].flag.empty()) as_flagged.segment<2>(2 * i).setOnes();
   const Index n_forces = 2 * std::ssize(ellipses_), n_unknowns = n_forces + 6;
   if (ellipses_.empty() || as_flagged.sum() < 10.0 * static_cast<double>(n_unknowns)) return {};
   if (places_um != places_um_) {
@@ -84,20 +61,20 @@ std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
     shapes_.resize(displacement_um.size(), n_unknowns);
     shapes_ << greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads_)
                    ->compliance_um_per_nN(places_um, ellipses_),
-        affine_motions(places_um);
+        inverse::affine_motions(beads);
     places_um_ = std::move(places_um);
     field_um_.resize(0);
   }
   // of the same frame again, some beads of which were mended, the last field tells which are astray
   const bool is_again = field_um_.size() == displacement_um.size() &&
                         (displacement_um.array() == displacement_um_.array()).count() > displacement_um.size() / 2;
-  VectorXd weights = is_again ? weights_of(displacement_um - field_um_, beads) : as_flagged;
+  VectorXd weights = is_again ? weights_of(displacement_um - field_um_, as_flagged) : as_flagged;
   const int n_rounds = is_again ? 1 : 4;
   for (int round = 1; round <= n_rounds; ++round) {
     const VectorXd sizes = weighted_fit(shapes_, displacement_um, weights, n_forces, threads_);
     if (sizes.size() == 0) return {};
     field_um_ = shapes_ * sizes;
-    if (round < n_rounds) weights = weights_of(displacement_um - field_um_, beads);
+    if (round < n_rounds) weights = weights_of(displacement_um - field_um_, as_flagged);
   }
   displacement_um_ = std::move(displacement_um);
   std::vector<Vec2> all;

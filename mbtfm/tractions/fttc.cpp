@@ -40,7 +40,7 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
     solver.solve(lambda, kScanTolerance);
     if (probe) probe->solve(lambda, kScanTolerance);
     const double misfit =
-        problem.data_squared() - 2 * solver.right_hand_side_times_solution() + solver.displaced_squared();
+        problem.data().squaredNorm() - 2 * solver.right_hand_side_times_solution() + solver.displaced_squared();
     points.push_back(
         {.lambda = lambda, .misfit = misfit, .norm = solver.solution_squared(), .degrees = degrees_of(lambda, 1)});
   }
@@ -93,7 +93,7 @@ Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const Tr
 
 Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   const LatticeProblem problem(inputs.beads, inputs.gel, lattice_options(parameters, threads));
-  if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
+  if (problem.data().isZero(0)) return reconstruction_of_nothing(problem, inputs);
   Reconstruction r;
   r.lambda_unit = LambdaUnit::um_per_kPa;
   TikhonovSolver solver(problem);
@@ -105,9 +105,7 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   const NodeField displacements = problem.displaced(waves);
   r.patches =
       patches_of(problem, tractions_kPa(problem, waves, parameters.read_out, parameters.gaussian_um), displacements);
-  double misfit = 0;
-  for (const double d : problem.residuals(displacements)) misfit += d * d;
-  r.relative_l2 = std::sqrt(misfit / problem.data_squared());
+  r.relative_l2 = problem.residuals(displacements).norm() / problem.data().norm();
   if (inputs.point_errors == PointErrors::stated)
     r.sigmas_kPa = drawn_errors_kPa(problem, *r.scan, *r.lambda, parameters, threads);
   r.forces = forces_beside(problem, *r.scan, r.patches, inputs, parameters, threads);
@@ -177,7 +175,7 @@ NodeField solution_for(const LatticeProblem& problem, TikhonovSolver& solver, do
 NodeField deviations_kPa(const LatticeProblem& problem, const LambdaScan& scan, double around_um) {
   std::mt19937_64 random(0);
   TikhonovSolver of_data(problem);
-  TikhonovSolver of_noise(problem, problem.pulled_back(problem.spread_of(drawn_noise(problem, scan.variance, random))),
+  TikhonovSolver of_noise(problem, problem.pulled_back(problem.spread(drawn_noise(problem, scan.variance, random))),
                           problem.threads());
   const NodeField t = solution_for(problem, of_data, scan.by_evidence);
   double by_noise = 0;
@@ -207,7 +205,7 @@ std::vector<Vec2> drawn_errors_kPa(const LatticeProblem& problem, const LambdaSc
     const WaveField waves = transform.forward(truth);
     const Eigen::VectorXd displacements =
         problem.at_beads(problem.displaced(waves)) + drawn_noise(problem, scan.variance, random);
-    TikhonovSolver solver(problem, problem.pulled_back(problem.spread_of(displacements)), 1);
+    TikhonovSolver solver(problem, problem.pulled_back(problem.spread(displacements)), 1);
     solver.solve(lambda, kScanTolerance);
     errors[draw] = tractions_kPa(problem, solver.solution(), parameters.read_out, parameters.gaussian_um);
     const std::vector<Vec2> exact = tractions_kPa(problem, waves, parameters.read_out, 0);
@@ -299,14 +297,12 @@ std::vector<AdhesionForce> forces_beside(const LatticeProblem& problem, const La
                                          const TractionParameters& parameters, int threads) {
   std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
   if (forces.empty()) return forces;
-  const MatrixXd D = problem.weighted(even_forces_um_per_nN(inputs, parameters.gel_model, threads));
+  const MatrixXd D = problem.roots().asDiagonal() * even_forces_um_per_nN(inputs, parameters.gel_model, threads);
   const Known known = most_likely(problem, scan, D, threads);
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const auto row = 2 * static_cast<Index>(a);
     forces[a].force_nN = {known.mean[row], known.mean[row + 1]};
-    const Vec2 along = direction_of(forces[a].force_nN);
-    const Eigen::Vector2d e(along.x, along.y);
-    forces[a].sigma_nN = std::sqrt(e.dot(known.covariance.block<2, 2>(row, row) * e));
+    forces[a].sigma_nN = error_along(known.mean.segment<2>(row), known.covariance.block<2, 2>(row, row));
   }
   return forces;
 }
@@ -349,7 +345,7 @@ MatrixXd BesideBackground::times_S(const MatrixXd& columns) const {
     WaveField waves = transform.no_waves();
     NodeField nodes;
     for (int k = kEach * part; k < std::min(n, kEach * (part + 1)); ++k) {
-      nodes = problem_.spread_of(columns.col(k), std::move(nodes));
+      nodes = problem_.spread(columns.col(k), std::move(nodes));
       transform.forward(nodes, waves, 1);
       problem_.spectrum().displace(waves);
       problem_.spectrum().displace(waves);

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "mbtfm/inverse/regularisation.h"
 #include "mbtfm/tractions/lattice_problem.h"
-#include "mbtfm/tractions/regularisation.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/numerics/dense.h"
 

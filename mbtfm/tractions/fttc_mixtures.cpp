@@ -11,16 +11,6 @@ namespace mbtfm::tractions {
 
 namespace {
 
-Eigen::VectorXd components_of(const DisplacementField& beads) {
-  Eigen::VectorXd components(2 * std::ssize(beads));
-  Eigen::Index row = 0;
-  for (const Bead& b : beads) {
-    components.segment<2>(row) << b.displacement_um.x, b.displacement_um.y;
-    row += 2;
-  }
-  return components;
-}
-
 Eigen::VectorXd sums_nN(const Lattice& field, const std::vector<Vec2>& tractions, const std::vector<int>& owners,
                         std::size_t n_adhesions) {
   Eigen::VectorXd sums = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(n_adhesions));
@@ -40,7 +30,7 @@ FttcMixtures::FttcMixtures(const DisplacementField& field, const DisplacementFie
   n_data_ = problem.n_data();
   unit_variance_ = *problem.stated_variance();
   Eigen::MatrixX2d data(2 * std::ssize(field), 2);
-  data << problem.data(), problem.weighted(components_of(noise));
+  data << problem.data(), problem.roots().cwiseProduct(components_of(noise));
   std::vector<Vec2> nodes_um;
   for (const GroundPatch& p :
        patches_of(problem, std::vector<Vec2>(static_cast<std::size_t>(problem.field().n_nodes())),
@@ -51,8 +41,8 @@ FttcMixtures::FttcMixtures(const DisplacementField& field, const DisplacementFie
   const auto solver_of = [&](const NodeField& spread) {
     return TikhonovSolver(problem, problem.pulled_back(spread), threads);
   };
-  std::array<TikhonovSolver, 2> solvers = {solver_of(problem.spread_of(data.col(0))),
-                                           solver_of(problem.spread_of(data.col(1)))};
+  std::array<TikhonovSolver, 2> solvers = {solver_of(problem.spread(data.col(0))),
+                                           solver_of(problem.spread(data.col(1)))};
   TikhonovSolver probe = solver_of(problem.spread_signs());
   for (const double lambda : lambdas_of(problem)) {
     AtLambda at{
@@ -107,7 +97,7 @@ Eigen::VectorXd FttcMixtures::forces_nN(double factor) const {
   const auto variance_left_at = [&](double lambda) {
     const Eigen::VectorXd left =
         between(lambda, [&](const AtLambda& at) -> Eigen::VectorXd { return at.residuals * mixture / factor; });
-    return robust_variance({left.begin(), left.end()}, between(lambda, [](const AtLambda& at) { return at.degrees; }),
+    return robust_variance(left, between(lambda, [](const AtLambda& at) { return at.degrees; }),
                            between(lambda, [](const AtLambda& at) { return at.degrees_of_square; }));
   };
   const LambdaScan scan = judge(std::move(points), n_data_, unit_variance_, variance_left_at, unbiased_risks(n_data_));

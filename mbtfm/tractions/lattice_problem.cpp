@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "mbtfm/inverse/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
@@ -143,24 +144,12 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
       greens::wave_compliance(gel, options.model, 2 * std::numbers::pi / longest_um).across_um_per_kPa;
   n_beads_ = beads.size();
 
-  const bool states_errors = state_errors(beads);
-  double sum = 0;
-  for (const Bead& b : beads) sum += states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1;
-  const double n_nodes = static_cast<double>(field_.n_nodes());
-  if (states_errors) stated_variance_ = n_nodes / sum;
-
-  Eigen::ArrayXd &x = data_x_, &y = data_y_;
-  x.resize(beads.size());
-  y.resize(beads.size());
-  root_weights_.resize(beads.size());
-  bool is_on_nodes = true, is_even = true;
+  inverse::WeightedBeads weighted = inverse::weighted(beads, static_cast<double>(field_.n_nodes()));
+  stated_variance_ = weighted.stated_variance;
+  roots_ = std::move(weighted.roots);
+  data_ = std::move(weighted.data);
   for (std::size_t i = 0; i < beads.size(); ++i) {
-    const Bead& b = beads[i];
-    const double weight = (states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1) * n_nodes / sum;
-    is_even = is_even && std::abs(weight - 1) < 1e-9;
-    const double root = std::sqrt(weight);
-    root_weights_[i] = root;
-    const Vec2 at = 1 / field_.spacing_um * (b.position_um - field_.origin_um);
+    const Vec2 at = 1 / field_.spacing_um * (beads[i].position_um - field_.origin_um);
     const Stencil column = stencil_of(at.x), row = stencil_of(at.y);
     first_tap_.push_back(taps_.size());
     for (int q = 0; q < 4; ++q) {
@@ -169,25 +158,23 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
         if (share == 0) continue;
         const int node =
             wrapped(column.node + p - 1, box_.n_columns) + box_.n_columns * wrapped(row.node + q - 1, box_.n_rows);
-        taps_.push_back({node, root * share});
+        taps_.push_back({node, roots_[2 * static_cast<Index>(i)] * share});
       }
     }
-    is_on_nodes = is_on_nodes && taps_.size() == first_tap_.back() + 1;
-    x[i] = root * b.displacement_um.x;
-    y[i] = root * b.displacement_um.y;
   }
   first_tap_.push_back(taps_.size());
-  is_complete_ = is_on_nodes && is_even && static_cast<Eigen::Index>(beads.size()) == field_.n_nodes();
-  data_squared_ = x.square().sum() + y.square().sum();
-  spread_ = spread(x, y);
+  const bool is_even = (roots_.array().square() - 1).abs().maxCoeff() < 1e-9;
+  is_complete_ = taps_.size() == beads.size() && is_even && std::ssize(beads) == field_.n_nodes();
+  spread_ = spread(data_);
 }
 
-NodeField LatticeProblem::spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y, NodeField nodes) const {
+NodeField LatticeProblem::spread(const VectorXd& components, NodeField nodes) const {
   for (auto* part : {&nodes.x, &nodes.y}) part->setZero(box_.n_nodes());
   for (std::size_t i = 0; i < n_beads_; ++i) {
+    const auto row = 2 * static_cast<Index>(i);
     for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
-      nodes.x[taps_[k].node] += taps_[k].weight * x[i];
-      nodes.y[taps_[k].node] += taps_[k].weight * y[i];
+      nodes.x[taps_[k].node] += taps_[k].weight * components[row];
+      nodes.y[taps_[k].node] += taps_[k].weight * components[row + 1];
     }
   }
   return nodes;
@@ -195,44 +182,21 @@ NodeField LatticeProblem::spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& 
 
 NodeField LatticeProblem::spread_signs() const {
   std::mt19937_64 random(1);
-  Eigen::ArrayXd x(n_beads_), y(n_beads_);
-  for (auto* part : {&x, &y}) {
-    for (double& value : *part) value = random() % 2 == 0 ? 1 : -1;
-  }
-  return spread(x, y);
+  VectorXd signs(data_.size());
+  for (const Index first : {0, 1})
+    for (Index row = first; row < signs.size(); row += 2) signs[row] = random() % 2 == 0 ? 1 : -1;
+  return spread(signs);
 }
 
-Eigen::VectorXd LatticeProblem::data() const {
-  Eigen::VectorXd components(2 * static_cast<Eigen::Index>(n_beads_));
-  components(Eigen::seq(0, Eigen::last, 2)) = data_x_;
-  components(Eigen::seq(1, Eigen::last, 2)) = data_y_;
-  return components;
-}
-
-Eigen::MatrixXd LatticeProblem::weighted(Eigen::MatrixXd by_component) const {
-  for (Eigen::Index i = 0; i < root_weights_.size(); ++i) by_component.middleRows<2>(2 * i) *= root_weights_[i];
-  return by_component;
-}
-
-NodeField LatticeProblem::spread_of(const Eigen::VectorXd& components, NodeField memory) const {
-  return spread(components(Eigen::seq(0, Eigen::last, 2)), components(Eigen::seq(1, Eigen::last, 2)),
-                std::move(memory));
-}
-
-Eigen::VectorXd LatticeProblem::at_beads(const NodeField& nodes) const {
-  Eigen::VectorXd components = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(n_beads_));
+VectorXd LatticeProblem::at_beads(const NodeField& nodes) const {
+  VectorXd components = VectorXd::Zero(2 * static_cast<Eigen::Index>(n_beads_));
   for (std::size_t i = 0; i < n_beads_; ++i) {
     for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
-      components[2 * static_cast<Eigen::Index>(i)] += taps_[k].weight * nodes.x[taps_[k].node];
-      components[2 * static_cast<Eigen::Index>(i) + 1] += taps_[k].weight * nodes.y[taps_[k].node];
+      components[2 * static_cast<Index>(i)] += taps_[k].weight * nodes.x[taps_[k].node];
+      components[2 * static_cast<Index>(i) + 1] += taps_[k].weight * nodes.y[taps_[k].node];
     }
   }
   return components;
-}
-
-std::vector<double> LatticeProblem::residuals(const NodeField& nodes) const {
-  const Eigen::VectorXd left = data() - at_beads(nodes);
-  return {left.begin(), left.end()};
 }
 
 void LatticeProblem::normal(const NodeField& nodes, NodeField& result) const {

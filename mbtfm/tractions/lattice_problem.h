@@ -9,6 +9,7 @@
 
 #include "mbtfm/tractions/surface_spectrum.h"
 #include "pipeline/contract/beads.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tractions {
 
@@ -36,7 +37,6 @@ class LatticeProblem {
   const SurfaceSpectrum& spectrum() const { return *spectrum_; }
   const WaveTransform& transform() const { return *transform_; }
   double n_data() const { return static_cast<double>(2 * n_beads_); }
-  double data_squared() const { return data_squared_; }  ///< |u|²
   /// The across compliance of the wave that just fits into the field.
   double longest_wave_um_per_kPa() const { return longest_wave_um_per_kPa_; }
   bool is_complete() const { return is_complete_; }  ///< one bead on each node, all of one weight
@@ -47,16 +47,15 @@ class LatticeProblem {
   const NodeField& spread_data() const { return spread_; }
   /// Pᵀ z of random signs: tells the trace of the influence matrix (Hutchinson 1990).
   NodeField spread_signs() const;
-  /// u: 2·beads, components in turn
-  Eigen::VectorXd data() const;
-  /// 2·beads × any number: rows of beads' components times the roots of their weights.
-  Eigen::MatrixXd weighted(Eigen::MatrixXd by_component) const;
+  /// u: 2·beads, components in turn, and the roots of their weights
+  const VectorXd& data() const { return data_; }
+  const VectorXd& roots() const { return roots_; }
   /// Pᵀ of weighted components. @param memory  for it: fresh memory costs more
-  NodeField spread_of(const Eigen::VectorXd& components, NodeField memory = {}) const;
+  NodeField spread(const VectorXd& components, NodeField memory = {}) const;
   /// P of displacements on the lattice, component by component
-  Eigen::VectorXd at_beads(const NodeField& displacements) const;
+  VectorXd at_beads(const NodeField& displacements) const;
   /// u − P of displacements on the lattice, component by component
-  std::vector<double> residuals(const NodeField& displacements) const;
+  VectorXd residuals(const NodeField& displacements) const { return data_ - at_beads(displacements); }
   /// Pᵀ P of nodes, to `result`
   void normal(const NodeField& nodes, NodeField& result) const;
   /// G of waves, in space
@@ -65,7 +64,6 @@ class LatticeProblem {
   WaveField pulled_back(const NodeField& spread) const;
 
  private:
-  NodeField spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y, NodeField nodes = {}) const;
   Lattice field_, box_;
   std::unique_ptr<SurfaceSpectrum> spectrum_;
   std::unique_ptr<WaveTransform> transform_;
@@ -73,7 +71,7 @@ class LatticeProblem {
   int threads_;
   bool is_complete_ = false;
   std::optional<double> stated_variance_;
-  double data_squared_ = 0, longest_wave_um_per_kPa_ = 0;
+  double longest_wave_um_per_kPa_ = 0;
   struct Tap {
     int node = 0;
     double weight = 0;
@@ -81,8 +79,7 @@ class LatticeProblem {
   std::vector<Tap> taps_;               ///< of all beads in turn
   std::vector<std::size_t> first_tap_;  ///< by bead, and one more
   NodeField spread_;
-  Eigen::ArrayXd data_x_, data_y_;  ///< u
-  Eigen::ArrayXd root_weights_;     ///< by bead
+  VectorXd data_, roots_;
 };
 
 /// (G PᵀP G + lambda²) t = b by conjugate gradients, preconditioned with the inverse for a field without gaps or

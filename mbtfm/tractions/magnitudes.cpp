@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/inverse/rows.h"
 #include "mbtfm/tractions/traction.h"
 
 namespace mbtfm::tractions {
@@ -80,9 +81,8 @@ Magnitudes expected_magnitudes(const std::vector<Vec2>& forces_nN, const MatrixX
       squared += weight * (mean2 + spread);
     }
     deviation[a] = std::sqrt(std::max(0.0, squared - std::pow(magnitudes.expected_nN[a], 2)));
-    const Vec2 direction = direction_of(forces_nN[a]);
-    along.col(a) << direction.x, direction.y;
-    error_along[a] = std::sqrt(along.col(a).dot(block(a, a) * along.col(a)));
+    along.col(a) = inverse::direction_of(found);
+    error_along[a] = inverse::error_along(found, block(a, a));
   }
   // errors of different forces go together as those found along them do
   for (Index a = 0; a < n; ++a)

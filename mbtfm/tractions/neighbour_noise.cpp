@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "mbtfm/inverse/loss.h"
 #include "pipeline/numerics/near.h"
-#include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::tractions {
 
@@ -62,11 +62,9 @@ std::optional<double> noise_from_neighbours_um(const DisplacementField& beads) {
   std::nth_element(predictions.begin(), half, predictions.end(),
                    [](const Prediction& a, const Prediction& b) { return a.strain < b.strain; });
   std::vector<double> magnitudes;
-  for (auto p = predictions.begin(); p != half; ++p) {
-    magnitudes.push_back(std::abs(p->residual_um.x));
-    magnitudes.push_back(std::abs(p->residual_um.y));
-  }
-  return 1.4826 * numerics::median_in(magnitudes);  // the median's of a Gaussian
+  for (auto p = predictions.begin(); p != half; ++p)
+    magnitudes.insert(magnitudes.end(), {std::abs(p->residual_um.x), std::abs(p->residual_um.y)});
+  return inverse::scale_of(std::move(magnitudes), 1);
 }
 
 std::optional<double> assume_noise_um(DisplacementField& beads) {

@@ -4,32 +4,14 @@
 #include <array>
 #include <optional>
 
-#include "mbtfm/tractions/regularisation.h"
+#include "mbtfm/inverse/regularisation.h"
+#include "mbtfm/tractions/methods.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/stage/parameters_fwd.h"
 
 namespace mbtfm::tractions {
 
-enum class TractionMethod {
-  // beads of a flat surface, displaced along it
-  fttc,
-  sparse,
-  trpf,
-  bem,
-  adhesion_forces,
-  // beads in space: mbtfm/spatial
-  tikhonov,   ///< one lambda for all
-  group_l1,   ///< zero in most places
-  patches,    ///< a force on each adhesion, and a weak background
-  adjoint,    ///< the equations of tikhonov, by its adjoint
-  direct,     ///< the displacement measured is imposed on the surface
-  green,      ///< even tractions on facets
-  thesis_cg,  ///< the minimum of tikhonov, by the thesis' minimiser
-};
-constexpr auto words(TractionMethod) {
-  return std::array{"fttc",     "sparse",  "trpf",    "bem",    "adhesion-forces", "tikhonov",
-                    "group-l1", "patches", "adjoint", "direct", "green",           "thesis-cg"};
-}
+using namespace inverse;  // criteria, spectra and scans are that room's
 
 /// How the tractions of a lattice are read out.
 enum class ReadOut {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "mbtfm/inverse/group_lasso.h"
+#include "mbtfm/inverse/spectrum.h"
 #include "mbtfm/tractions/fttc.h"
-#include "mbtfm/tractions/group_lasso.h"
-#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::tractions {
@@ -20,12 +20,6 @@ VectorXd column_of(const NodeField& t) {
   VectorXd column(2 * t.x.size());
   column << t.x.matrix(), t.y.matrix();
   return column;
-}
-
-double misfit_of(const LatticeProblem& problem, const NodeField& displacements) {
-  double misfit = 0;
-  for (const double d : problem.residuals(displacements)) misfit += d * d;
-  return misfit;
 }
 
 struct Choice {
@@ -69,7 +63,7 @@ Choice choose_weight(const LatticeProblem& problem, double largest_kPa) {
     const auto n_active = (lengths_of(lasso.x(), n_nodes) > 0).count();
     const double left = problem.n_data() - 2 * static_cast<double>(n_active);
     const NodeField tractions = nodes_of(lasso.x());
-    const double misfit = misfit_of(problem, problem.displaced(transform.forward(tractions)));
+    const double misfit = problem.residuals(problem.displaced(transform.forward(tractions))).squaredNorm();
     const double criterion = misfit / (left * left);
     if (left <= 0 || criterion > tolerance * least) break;
     least = std::min(least, criterion);
@@ -157,7 +151,7 @@ LinearMap map_on(const LatticeProblem& problem, const std::vector<Index>& nodes,
                 MatrixXd adjoint(smooth.rows(), components.cols());
                 for (Index c = 0; c < components.cols(); ++c) {
                   const NodeField t =
-                      problem.transform().backward(problem.pulled_back(problem.spread_of(components.col(c))));
+                      problem.transform().backward(problem.pulled_back(problem.spread(components.col(c))));
                   for (Index k = 0; k < std::ssize(nodes); ++k)
                     adjoint.col(c).segment<2>(2 * k) << t.x[nodes[k]], t.y[nodes[k]];
                   adjoint.col(c) = smooth * adjoint.col(c).eval();  // symmetric
@@ -217,7 +211,7 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
         "cross-validation");
   }
   const LatticeProblem problem(inputs.beads, inputs.gel, lattice_options(parameters, threads));
-  if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
+  if (problem.data().isZero(0)) return reconstruction_of_nothing(problem, inputs);
   TikhonovSolver smooth(problem);
   const LambdaScan scan = scan_lambda(problem, smooth);
   smooth.solve(scan.by_risk, 1e-2);
@@ -230,7 +224,7 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
   const NodeField displacements = problem.displaced(problem.transform().forward(fit.tractions));
   r.patches = patches_of(problem, on_field(problem, fit.tractions), displacements);
   r.forces = forces_beside(problem, scan, r.patches, inputs, parameters, threads);
-  r.relative_l2 = std::sqrt(misfit_of(problem, displacements) / problem.data_squared());
+  r.relative_l2 = problem.residuals(displacements).norm() / problem.data().norm();
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"penalty_um2_per_kPa", choice.weight},
                {"n_active_cells", static_cast<std::int64_t>(fit.n_nodes)},

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "mbtfm/inverse/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
@@ -27,42 +28,20 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
   list.add("grow_um", p.grow_um, Range::zero_or_size_um());
 }
 
-namespace {
-
-Reconstruction reconstruct_by_method(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
+Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   const TractionMethod method = parameters.method.value_or(TractionMethod::fttc);
-  switch (method) {
-    case TractionMethod::fttc:
-      return reconstruct_fttc(inputs, parameters, threads);
-    case TractionMethod::sparse:
-      return reconstruct_sparse(inputs, parameters, threads);
-    case TractionMethod::trpf:
-      return reconstruct_point_forces(inputs, parameters, threads);
-    case TractionMethod::bem:
-      return reconstruct_elements(inputs, parameters, threads);
-    case TractionMethod::adhesion_forces:
-      return reconstruct_adhesion_forces(inputs, parameters, threads);
-    default:
-      throw UsageError(std::string(name_of(method)) +
-                       " takes beads in space: give a displacement_3d.csv, with z_um and uz_um, or choose fttc, "
-                       "sparse, trpf, bem or adhesion-forces");
-  }
-}
-
-void add_intervals(std::vector<AdhesionForce>& forces) {
-  for (AdhesionForce& f : forces) {
+  FlatMethod* by = flat_method(method);
+  if (!by)
+    throw UsageError(std::string(name_of(method)) +
+                     " takes beads in space: give a displacement_3d.csv, with z_um and uz_um, or choose fttc, "
+                     "sparse, trpf, bem or adhesion-forces");
+  Reconstruction r = by(inputs, parameters, threads);
+  for (AdhesionForce& f : r.forces) {
     if (!f.sigma_nN) continue;
     const numerics::MagnitudeInterval interval = numerics::magnitude_interval_95(norm(f.force_nN), *f.sigma_nN);
     f.low_nN = interval.low;
     f.high_nN = interval.high;
   }
-}
-
-}  // namespace
-
-Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
-  Reconstruction r = reconstruct_by_method(inputs, parameters, threads);
-  add_intervals(r.forces);
   return r;
 }
 
@@ -141,9 +120,18 @@ MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model,
       ->compliance_um_per_nN(points_of(inputs.beads), substrate::ellipses_of(inputs.adhesions));
 }
 
-Vec2 direction_of(Vec2 force_nN) {
-  const double length = norm(force_nN);
-  return length > 0 ? 1 / length * force_nN : Vec2{1, 0};
+std::vector<AdhesionForce> forces_with_errors(const std::vector<Adhesion>& adhesions, const VectorXd& forces_nN,
+                                              const MatrixXd& covariance_nN2) {
+  std::vector<AdhesionForce> forces;
+  for (Index a = 0; a < std::ssize(adhesions); ++a) {
+    const Eigen::Vector2d f = forces_nN.segment<2>(2 * a);
+    forces.push_back({.adhesion_id = adhesions[a].adhesion_id,
+                      .force_nN = {f.x(), f.y()},
+                      .sigma_nN = inverse::error_along(f, covariance_nN2.block<2, 2>(2 * a, 2 * a)),
+                      .connected = false,
+                      .moment_nN_um = 0});
+  }
+  return forces;
 }
 
 TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {

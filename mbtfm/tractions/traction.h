@@ -1,13 +1,12 @@
 /// Standard traction reconstructions from bead displacements, and what is summed up of them.
 #pragma once
 
-#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "mbtfm/inverse/regularisation.h"
 #include "mbtfm/tractions/parameters.h"
-#include "mbtfm/tractions/regularisation.h"
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/figures.h"
@@ -16,6 +15,7 @@
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/named_array.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tractions {
 
@@ -45,8 +45,8 @@ constexpr auto words(LambdaUnit) { return std::array{"um_per_kPa", "um_per_nN"};
 
 /// How large forces are that are known with errors: noise makes every one longer.
 struct Magnitudes {
-  Eigen::VectorXd expected_nN;     ///< by force
-  Eigen::MatrixXd covariance_nN2;  ///< of the true magnitudes around these
+  VectorXd expected_nN;     ///< by force
+  MatrixXd covariance_nN2;  ///< of the true magnitudes around these
 };
 
 /// Expected |F_a| for found forces F̂ = F + error, error ~ N(0, C), docs/theory/reconstructions.md (18). Before the
@@ -54,7 +54,7 @@ struct Magnitudes {
 /// force; the shares of these are the most likely ones for all F̂ (Stephens, Biostatistics 18 (2017) 275). With them the
 /// sum of the expected magnitudes is right in the mean, however many forces are no larger than their errors.
 /// @param covariance_nN2  C, rows 2a and 2a + 1 of force a, positive definite
-Magnitudes expected_magnitudes(const std::vector<Vec2>& forces_nN, const Eigen::MatrixXd& covariance_nN2);
+Magnitudes expected_magnitudes(const std::vector<Vec2>& forces_nN, const MatrixXd& covariance_nN2);
 
 struct Reconstruction {
   std::vector<GroundPatch> patches;
@@ -75,28 +75,17 @@ struct Reconstruction {
 /// @throws UsageError, InvalidData, NotSolved
 Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
 
-/// One force for each adhesion, spread evenly over its ellipse; no regularisation.
-Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const TractionParameters& parameters,
-                                           int threads);
-Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
-/// Group L1, its weight by generalised cross-validation.
-Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
-
-/// A force at the centre of each adhesion, with a Tikhonov penalty.
-Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const TractionParameters& parameters,
-                                        int threads);
-/// Tractions on square elements that cover the cell, with a Tikhonov penalty.
-Reconstruction reconstruct_elements(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
-
 /// Each adhesion's force: the sum over the patches on its grown ellipse; without errors.
 std::vector<AdhesionForce> forces_by_adhesion(const std::vector<GroundPatch>& patches,
                                               const std::vector<Adhesion>& adhesions, double grow_um);
 
-/// Displacements of the beads by a force of one spread evenly over each adhesion: 2·beads × 2·adhesions.
-Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads);
+/// Forces of the adhesions (2a, 2a + 1) with their standard errors along themselves.
+/// @param covariance_nN2  of the components
+std::vector<AdhesionForce> forces_with_errors(const std::vector<Adhesion>& adhesions, const VectorXd& forces_nN,
+                                              const MatrixXd& covariance_nN2);
 
-/// Along which the error of a force's magnitude is taken: the force, or x where there is none.
-Vec2 direction_of(Vec2 force_nN);
+/// Displacements of the beads by a force of one spread evenly over each adhesion: 2·beads × 2·adhesions.
+MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads);
 
 /// Sums over the patches near the cell.
 struct TractionSums {

@@ -2,9 +2,9 @@
 /// density, the error of the tractions. Each on linear problems small enough to be solved outright.
 #include <Eigen/Dense>
 
+#include "mbtfm/inverse/regularisation.h"
+#include "mbtfm/inverse/spectrum.h"
 #include "mbtfm/tractions/dense_problem.h"
-#include "mbtfm/tractions/regularisation.h"
-#include "mbtfm/tractions/spectrum.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::tractions {
@@ -181,8 +181,8 @@ TEST(Criteria, risk_by_direction_is_that_of_all_where_each_direction_is_told) {
   const MatrixXd G = falling(120, 40, 0.9, 1);
   const VectorXd u = G * VectorXd::Constant(40, 1) + noise_of(1e-2, 120, 4);
   EXPECT_NEAR(
-      scan_by_direction(G, u, 1e-4, SignalIn::told).by_risk / scan_by_direction(G, u, 1e-4, SignalIn::felt).by_risk, 1,
-      1e-6);
+      scan_by_direction(G, u, 1e-4, SignalIn::resolved).by_risk / scan_by_direction(G, u, 1e-4, SignalIn::felt).by_risk,
+      1, 1e-6);
 }
 
 TEST(Criteria, risk_by_direction_does_not_follow_directions_of_noise_alone) {
@@ -196,7 +196,7 @@ TEST(Criteria, risk_by_direction_does_not_follow_directions_of_noise_alone) {
   double worst = 0, worst_of_all = 0;
   for (unsigned draw = 0; draw < kDraws; ++draw) {
     const VectorXd u = G * t + noise_of(0.1, kData, 3000 + draw);
-    const LambdaScan scan = scan_by_direction(G, u, 0.01, SignalIn::told);
+    const LambdaScan scan = scan_by_direction(G, u, 0.01, SignalIn::resolved);
     const VectorXd pulled = G.transpose() * u;
     const auto error_at = [&](double lambda) {
       return ((pulled.array() / (values + lambda * lambda)).matrix() - t).norm();
@@ -249,7 +249,7 @@ TEST(Criteria, the_variance_that_residuals_tell_is_that_of_the_data) {
     for (unsigned draw = 0; draw < kDraws; ++draw) {
       const VectorXd e = noise_of(0.5, kN, 2000 + draw);
       const VectorXd r = e - H * e;
-      const double variance = robust_variance({r.begin(), r.end()}, H.trace(), (H * H).trace());
+      const double variance = robust_variance(r, H.trace(), (H * H).trace());
       mean += variance / kDraws;
       squares += variance * variance / kDraws;
     }

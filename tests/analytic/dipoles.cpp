@@ -35,11 +35,11 @@ TEST(Dipoles, sparse_has_neither_peaks_nor_moments_of_its_own_on_scattered_beads
 TEST(Dipoles, normal_equations_beside_tractions_everywhere_are_those_of_the_dense_covariance) {
   const test::DipoleScene scene = test::dipole_scene({.beads_per_um2 = 0.08}, 1);
   const LatticeProblem problem(scene.inputs.beads, scene.inputs.gel, {.model = GelModel::half_space});
-  const MatrixXd D = problem.weighted(even_forces_um_per_nN(scene.inputs, GelModel::half_space, 1));
+  const MatrixXd D = problem.roots().asDiagonal() * even_forces_um_per_nN(scene.inputs, GelModel::half_space, 1);
   const Index n = D.rows();
   MatrixXd S(n, n);
   for (Index k = 0; k < n; ++k)
-    S.col(k) = problem.at_beads(problem.displaced(problem.pulled_back(problem.spread_of(Eigen::VectorXd::Unit(n, k)))));
+    S.col(k) = problem.at_beads(problem.displaced(problem.pulled_back(problem.spread(Eigen::VectorXd::Unit(n, k)))));
   BesideBackground beside(problem, D, 1);
   for (const double m : {3.0, 0.3, 0.03}) {
     const MatrixXd W = numerics::solve_symmetric(MatrixXd::Identity(n, n) + S / (m * m), D);

@@ -212,7 +212,7 @@ double efficiency(Loss loss) {
   constexpr double kStep = 1e-3;
   double slope = 0, psi_squared = 0;
   for (double r = kStep / 2; r < 10; r += kStep) {
-    const double share = kStep * r * std::exp(-0.5 * r * r), psi = r * robust_weight(loss, r);
+    const double share = kStep * r * std::exp(-0.5 * r * r), psi = r * inverse::weight(loss, r, 2);
     slope += share * psi * r / 2;
     psi_squared += share * psi * psi / 2;
   }
@@ -229,10 +229,10 @@ TEST(RobustLoss, costs_the_efficiency_it_says_where_the_noise_is_Gaussian_in_the
 TEST(RobustLoss, lets_one_bead_pull_no_harder_than_a_bound) {
   // w r: rises no more beyond huber's bound, and comes back to zero for tukey
   for (const double r : {2.0, 10.0, 1e6}) {
-    EXPECT_NEAR(r * robust_weight(Loss::huber, r), 100 * robust_weight(Loss::huber, 100), 1e-9);
-    EXPECT_NEAR(r * robust_weight(Loss::l1, r), 1, 1e-9);
+    EXPECT_NEAR(r * inverse::weight(Loss::huber, r, 2), 100 * inverse::weight(Loss::huber, 100, 2), 1e-9);
+    EXPECT_NEAR(r * inverse::weight(Loss::l1, r, 2), 1, 1e-9);
   }
-  EXPECT_EQ(robust_weight(Loss::tukey, 10), 0);
+  EXPECT_EQ(inverse::weight(Loss::tukey, 10, 2), 0);
 }
 
 TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
@@ -250,7 +250,7 @@ TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
   for (const Loss loss : {Loss::squares, Loss::huber, Loss::tukey}) {
     double weights = 0;
     for (Eigen::Index b = 0; b < kBeads; ++b)
-      weights += robust_weight(loss, data.displacement_um.segment<2>(2 * b).norm() / 0.2) / kBeads;
+      weights += inverse::weight(loss, data.displacement_um.segment<2>(2 * b).norm() / 0.2, 2) / kBeads;
     const double variance = misfit_variance(data, no_forces, 1, loss) / weights;
     EXPECT_NEAR(variance * efficiency(loss) / 0.04, 1, 4 * 2 / std::sqrt(1.0 * kBeads)) << name_of(loss);
   }

@@ -144,7 +144,8 @@ TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_
   const LatticeProblem problem(beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
                                {.model = GelModel::half_space, .padding = 1.5, .threads = 1});
   EXPECT_GT(static_cast<double>(problem.field().n_nodes()), 2.0 * kBeads);
-  EXPECT_NEAR(problem.data_squared() / problem.n_data() / *problem.stated_variance(), 1, 4 / std::sqrt(1.0 * kBeads));
+  EXPECT_NEAR(problem.data().squaredNorm() / problem.n_data() / *problem.stated_variance(), 1,
+              4 / std::sqrt(1.0 * kBeads));
 }
 
 TEST(Tractions, that_swirl_around_an_adhesions_centre_have_a_moment_of_their_sense) {

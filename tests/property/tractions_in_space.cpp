@@ -1,12 +1,12 @@
 /// Laws of reconstructions in space: on a half-space, whose answer is a closed form.
 #include <Eigen/QR>
 
+#include "mbtfm/inverse/spectrum.h"
 #include "mbtfm/spatial/foresight.h"
 #include "mbtfm/spatial/loss.h"
 #include "mbtfm/spatial/problem.h"
 #include "mbtfm/spatial/repeated.h"
 #include "mbtfm/spatial/traction_mesh.h"
-#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/findings.h"
 #include "tests/support/half_space_problem.h"
@@ -39,22 +39,22 @@ TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_thei
   constexpr double kNoise = 0.02;
   const VectorXd truth = VectorXd::NullaryExpr(240, [&]() { return normal(); });
   const VectorXd u = A * truth + kNoise * VectorXd::NullaryExpr(500, [&]() { return normal(); });
-  const tractions::Spectrum dense(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500);
-  const tractions::LinearMap map{[&](const MatrixXd& x) { return MatrixXd(A * x); },
-                                 [&](const MatrixXd& y) { return MatrixXd(A.transpose() * y); }, 500, 240};
-  const tractions::Recurrences recurrences(map, u, {.steps = 150, .probes = 8, .seed = 1});
+  const inverse::Spectrum dense(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500);
+  const inverse::LinearMap map{[&](const MatrixXd& x) { return MatrixXd(A * x); },
+                               [&](const MatrixXd& y) { return MatrixXd(A.transpose() * y); }, 500, 240};
+  const inverse::Recurrences recurrences(map, u, {.steps = 150, .probes = 8, .seed = 1});
   for (const double lambda : {0.3, 0.1, 0.03})
     EXPECT_LE(apart(recurrences.solve(lambda), dense.solve(lambda)), 1e-6) << lambda;
-  const auto ours = recurrences.scan(kNoise * kNoise), theirs = dense.scan(kNoise * kNoise, tractions::SignalIn::felt);
-  for (const auto criterion : {tractions::LambdaCriterion::gcv, tractions::LambdaCriterion::evidence,
-                               tractions::LambdaCriterion::discrepancy}) {
+  const auto ours = recurrences.scan(kNoise * kNoise), theirs = dense.scan(kNoise * kNoise, inverse::SignalIn::felt);
+  for (const auto criterion :
+       {inverse::LambdaCriterion::gcv, inverse::LambdaCriterion::evidence, inverse::LambdaCriterion::discrepancy}) {
     // traces by eight probes vary by sqrt(2 / (8 tr)) of themselves, tr ~ 100: 5 %; lambda follows by half of it
     EXPECT_NEAR(chosen_lambda(ours, criterion) / chosen_lambda(theirs, criterion), 1, 0.05) << name_of(criterion);
   }
   // The risk of the tractions has the trace over lambda², in a difference: its flat minimum moves by a fifth with them
   // (notes/tractions_in_space.md), which must not cost more than a few per cent of the error.
-  const double our_risk = chosen_lambda(ours, tractions::LambdaCriterion::risk),
-               their_risk = chosen_lambda(theirs, tractions::LambdaCriterion::risk);
+  const double our_risk = chosen_lambda(ours, inverse::LambdaCriterion::risk),
+               their_risk = chosen_lambda(theirs, inverse::LambdaCriterion::risk);
   EXPECT_LE(apart(dense.solve(our_risk), truth), 1.03 * apart(dense.solve(their_risk), truth));
 }
 
@@ -69,7 +69,7 @@ TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) 
     std::mt19937_64 random(seed);
     const auto draw = [&](int n) { return VectorXd(VectorXd::NullaryExpr(n, [&]() { return normal(random); })); };
     const auto felt_least = [&](const VectorXd& u) {
-      return tractions::Spectrum(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500).variance_felt_least();
+      return inverse::Spectrum(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500).variance_felt_least();
     };
     const VectorXd noise = kNoise * draw(500);
     n_alarms += felt_least(noise).has_value();
@@ -83,11 +83,11 @@ TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) 
 
 TEST(Losses, weigh_beads_by_the_length_of_their_residual_whatever_its_direction) {
   for (const BeadLoss loss : {BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
-    EXPECT_LE(loss_weight(loss, 4, 3), loss_weight(loss, 1, 3)) << name_of(loss);
-    EXPECT_GE(loss_weight(loss, 1, 3), 0) << name_of(loss);
+    EXPECT_LE(inverse::weight(shape_of(loss), 4, 3), inverse::weight(shape_of(loss), 1, 3)) << name_of(loss);
+    EXPECT_GE(inverse::weight(shape_of(loss), 1, 3), 0) << name_of(loss);
   }
-  EXPECT_EQ(loss_weight(BeadLoss::biweight, 6, 3), 0);
-  EXPECT_EQ(loss_weight(BeadLoss::huber, 1, 3), 1);
+  EXPECT_EQ(inverse::weight(shape_of(BeadLoss::biweight), 6, 3), 0);
+  EXPECT_EQ(inverse::weight(shape_of(BeadLoss::huber), 1, 3), 1);
 }
 
 TEST(Losses, find_the_scale_of_most_beads_and_their_variance) {
@@ -265,29 +265,29 @@ TEST_F(InSpace, adjoint_and_thesis_cg_end_at_the_minimum_of_tikhonov) {
 }
 
 TEST_F(InSpace, a_lambda_by_risk_that_runs_away_is_replaced_and_called_so) {
-  using enum tractions::LambdaCriterion;
+  using enum inverse::LambdaCriterion;
   const Problem right = scene.problem(scene.beads(0.02), parameters);
   const auto named = reconstruct_tikhonov(right, traction, parameters, 1);
   EXPECT_EQ(named.lambda_by, risk);
-  tractions::LambdaScan scan = *named.scan;
+  inverse::LambdaScan scan = *named.scan;
   scan.by_evidence = 1.9 * scan.by_risk;  // the bound is two
-  const auto chosen = choose_lambda(right, scan, traction, RiskIs::sound);
+  const auto chosen = choose_lambda(right, scan, traction, RiskCriterion::usable);
   EXPECT_EQ(chosen.by, risk);
   EXPECT_EQ(chosen.lambda, scan.by_risk);
   EXPECT_FALSE(fires("lambda-unbounded", chosen.finding));
   scan.by_evidence = 2.1 * scan.by_risk;
-  const auto replaced = choose_lambda(right, scan, traction, RiskIs::sound);
+  const auto replaced = choose_lambda(right, scan, traction, RiskCriterion::usable);
   EXPECT_EQ(replaced.by, evidence);
   EXPECT_EQ(replaced.lambda, scan.by_evidence);
   ASSERT_TRUE(fires("lambda-unbounded", replaced.finding));
   EXPECT_NEAR(replaced.finding->number.value_or(0), 2.1, 1e-9);
-  const auto unsound = choose_lambda(right, scan, traction, RiskIs::unsound);
+  const auto unsound = choose_lambda(right, scan, traction, RiskCriterion::use_gcv);
   EXPECT_EQ(unsound.by, gcv);
   EXPECT_EQ(unsound.lambda, scan.by_gcv);
   traction.lambda_by = gcv;  // what was asked for by name is taken
-  EXPECT_EQ(choose_lambda(right, scan, traction, RiskIs::sound).by, gcv);
+  EXPECT_EQ(choose_lambda(right, scan, traction, RiskCriterion::usable).by, gcv);
   traction.lambda_um_per_kPa = 0.1;
-  EXPECT_FALSE(choose_lambda(right, scan, traction, RiskIs::sound).by);
+  EXPECT_FALSE(choose_lambda(right, scan, traction, RiskCriterion::usable).by);
 }
 
 /// Of beads without noise a gel of another Poisson's ratio is all that is wrong.
@@ -309,7 +309,7 @@ TEST_F(InSpace, what_the_gel_has_wrong_is_not_followed_by_tractions) {
   const VectorXd even = VectorXd::Ones(problem.observed.displacement_um.size());
   const auto spectrum =
       spectrum_of(problem, basis.response(problem.response_um_per_kPa, 1), even, static_cast<double>(even.size()), 1);
-  const auto scan = spectrum.scan(problem.least_variance(), tractions::SignalIn::told);
+  const auto scan = spectrum.scan(problem.least_variance(), inverse::SignalIn::resolved);
   EXPECT_GT(apart(basis.tractions(spectrum.solve(scan.by_risk)), truth), 2 * best);
   RecordProperty("over_best", std::to_string(apart(found.traction_kPa, truth) / best) + " by noise alone " +
                                   std::to_string(apart(basis.tractions(spectrum.solve(scan.by_risk)), truth) / best));
@@ -747,7 +747,7 @@ TEST_F(InSpace, lambda_runs_away_where_few_beads_are_astray_or_a_stack_grew) {
       const Problem problem = problem_of(beads);
       const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
       EXPECT_TRUE(fires("lambda-unbounded", r.findings)) << scene.seed;
-      EXPECT_EQ(r.lambda_by, tractions::LambdaCriterion::evidence) << scene.seed;
+      EXPECT_EQ(r.lambda_by, inverse::LambdaCriterion::evidence) << scene.seed;
       TractionParameters of_risk = traction;
       of_risk.lambda_um_per_kPa = r.scan->by_risk / lambda_per_um_per_kPa(problem);
       const auto followed = reconstruct_tikhonov(problem, of_risk, parameters, 1);

@@ -1,16 +1,16 @@
-#include "mbtfm/tractions/regularisation.h"
+#include "mbtfm/inverse/regularisation.h"
 
 #include <algorithm>
 #include <boost/math/interpolators/cardinal_cubic_b_spline.hpp>
 #include <cmath>
 #include <functional>
 
+#include "mbtfm/inverse/loss.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/report.h"
-#include "pipeline/numerics/order_statistics.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::inverse {
 
 namespace {
 
@@ -82,9 +82,8 @@ std::vector<double> lambdas_between(double largest, double smallest) {
   return lambdas;
 }
 
-double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square) {
-  for (double& r : residuals) r = std::abs(r);
-  const double deviation = 1.4826 * numerics::median_in(residuals);  // of a Gaussian
+double robust_variance(const VectorXd& residuals, double degrees, double degrees_of_square) {
+  const double deviation = scale_of(residual_lengths(residuals, 1), 1);
   const auto n = static_cast<double>(residuals.size());
   return deviation * deviation * n / std::max(n - 2 * degrees + degrees_of_square, 1e-6 * n);
 }
@@ -214,4 +213,4 @@ double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion) {
                              " here; it aims at the tractions, and needs no corner"});
 }
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::inverse

@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "pipeline/contract/words.h"
+#include "pipeline/numerics/dense.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::inverse {
 
 /// The minimum of |u − G t|² + lambda² |t|² for one lambda, in the weights that the data carry.
 struct ScanPoint {
@@ -56,7 +57,7 @@ std::vector<double> log_determinants_of(const std::vector<ScanPoint>& points);
 
 /// The data's variance from residuals: their median magnitude, which the few that the model cannot follow do not move,
 /// over what is left of Gaussian noise where the tractions have followed it, tr (1 − H)² of n.
-double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square);
+double robust_variance(const VectorXd& residuals, double degrees, double degrees_of_square);
 
 /// @throws NotSolved where the criterion is the L-curve and has no corner, or the discrepancy and the misfit never is
 ///         what the stated errors leave; it says which criterion to take
@@ -80,4 +81,4 @@ struct RiskScale {
 /// Lambdas from `largest` down to `smallest`, some in each decade.
 std::vector<double> lambdas_between(double largest, double smallest);
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::inverse

@@ -1,29 +1,29 @@
 /// A linear problem in the frame of its own directions: every lambda at once.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "mbtfm/tractions/regularisation.h"
+#include "mbtfm/inverse/regularisation.h"
+#include "pipeline/numerics/dense.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::inverse {
 
 /// Directions in which the risk looks for a signal.
 enum class SignalIn {
-  felt,  ///< all that move the data: (15)
-  told   ///< those that the data tell from noise: (15b)
+  felt,     ///< all that move the data: (15)
+  resolved  ///< those that the data tell from noise: (15b)
 };
 
 /// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu. Values of AᵀA below 1e-12 of the largest are rounding, and none here.
 class Spectrum {
  public:
-  /// @param normal  AᵀA; what is below its diagonal does not count
-  /// @param pulled  Aᵀu
-  Spectrum(Eigen::MatrixXd normal, Eigen::VectorXd pulled, double data_squared, double n_data);
+  /// @param normal   AᵀA; what is below its diagonal does not count
+  /// @param adjoint  Aᵀu
+  Spectrum(MatrixXd normal, const VectorXd& adjoint, double data_squared, double n_data);
   /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise beside: criteria
   /// then are what they are expected to be. Of solve() nothing holds but the size.
   /// @param variance  of one datum
@@ -36,44 +36,50 @@ class Spectrum {
   /// white noise knows. None where they agree, or no data are left beside. Where a signal reaches so far down it is
   /// taken for such an error, and lambda is too large.
   std::optional<double> variance_felt_least() const;
-  Eigen::VectorXd solve(double lambda) const;
+  VectorXd solve(double lambda) const;
+  /// (AᵀA + lambda²)⁻¹ (Aᵀu + added)
+  VectorXd solve(double lambda, const VectorXd& added) const;
   /// Of solve(lambda), by the noise alone. @param variance  of one datum
-  Eigen::MatrixXd covariance(double lambda, double variance) const;
+  MatrixXd covariance(double lambda, double variance) const;
   /// Of s itself, where nothing but its size was known before: noise and what the penalty takes away.
-  Eigen::MatrixXd posterior(double lambda, double variance) const;
+  MatrixXd posterior(double lambda, double variance) const;
   /// By unknown: variance of what solve(lambda) errs by. @param prior_variance  of each unknown before the data
-  Eigen::VectorXd error_variances(double lambda, double variance, double prior_variance) const;
-  /// By unknown: how much of a change of it solve(lambda) shows, 0 … 1.
-  Eigen::VectorXd resolved(double lambda) const;
-  double explained(double lambda) const;  ///< uᵀ H u, H the matrix that takes u to A s
-  /// What a scan tells of one lambda.
-  ScanPoint point_at(double lambda) const;
+  VectorXd error_variances(double lambda, double variance, double prior_variance) const;
+  double explained(double lambda) const;         ///< uᵀ H u, H the matrix that takes u to A s
   double misfit(double lambda) const;            ///< |u − A s|² of solve(lambda)
+  double misfit_of(const VectorXd& s) const;     ///< the same of any s
   double removable_misfit(double lambda) const;  ///< the part of it that another s could remove
   double degrees(double lambda) const;           ///< trace of the matrix that takes u to A s
   double relative_l2(double lambda) const;       ///< |u − A s| / |u|
   double data_squared() const { return data_squared_; }
 
   /// V with AᵀA = V diag Vᵀ
-  const Eigen::MatrixXd& vectors() const { return *vectors_; }
+  const MatrixXd& vectors() const { return *vectors_; }
   const Eigen::ArrayXd& values() const { return values_; }
 
  private:
-  Eigen::MatrixXd outer(const Eigen::ArrayXd& shares) const;
+  friend class Recurrences;
+  /// Down to this part of the largest singular value. @param degrees, n_felt  of the whole problem
+  LambdaScan scan(double smallest_part, const std::function<double(double lambda)>& degrees, double n_felt,
+                  std::optional<double> stated_variance, SignalIn signal_in) const;
+  double misfit_in_frame(const Eigen::ArrayXd& shares) const;
+  MatrixXd outer(const Eigen::ArrayXd& shares) const;
   /// Directions that the data tell from noise. @param variance  of one datum
-  Eigen::Array<bool, Eigen::Dynamic, 1> is_told(double variance) const;
-  std::vector<double> told_risks(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
+  Eigen::Array<bool, Eigen::Dynamic, 1> is_resolved(double variance) const;
+  std::vector<double> risks_of_resolved(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
   double data_squared_, n_data_;
   Eigen::ArrayXd values_, projected_;
-  std::shared_ptr<const Eigen::MatrixXd> vectors_;
+  std::shared_ptr<const MatrixXd> vectors_;
 };
+
+Spectrum spectrum_of(const MatrixXd& A, const VectorXd& u, double n_data, int threads);
 
 // Every lambda of a linear problem whose matrix is never formed: Golub–Kahan recurrences side by side.
 
 /// A and Aᵀ on columns; many at a time cost hardly more than one.
 struct LinearMap {
-  std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)> forward, transposed;
-  Eigen::Index n_data = 0, n_unknowns = 0;
+  std::function<MatrixXd(const MatrixXd&)> forward, transposed;
+  Index n_data = 0, n_unknowns = 0;
 };
 
 struct RecurrenceOptions {
@@ -88,19 +94,19 @@ struct RecurrenceOptions {
 /// of another matrix: lambda by cross-validation comes out several times too small with them.
 class Recurrences {
  public:
-  Recurrences(const LinearMap& map, const Eigen::VectorXd& data, const RecurrenceOptions& options);
+  Recurrences(const LinearMap& map, const VectorXd& data, const RecurrenceOptions& options);
 
   /// @param stated_variance  of one datum
   LambdaScan scan(std::optional<double> stated_variance) const;
-  Eigen::VectorXd solve(double lambda) const { return basis_ * small_.front().solve(lambda); }
+  VectorXd solve(double lambda) const { return basis_ * small_.front().solve(lambda); }
   double degrees(double lambda) const;
   double misfit(double lambda) const { return small_.front().misfit(lambda); }
   double relative_l2(double lambda) const { return small_.front().relative_l2(lambda); }
 
  private:
-  double n_data_, n_felt_;
-  Eigen::MatrixXd basis_;        ///< of the solutions, by column
+  double n_felt_;
+  MatrixXd basis_;               ///< of the solutions, by column
   std::vector<Spectrum> small_;  ///< bidiagonal problems: of the data, then of the probes
 };
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::inverse

@@ -7,7 +7,7 @@
 
 #include "pipeline/contract/report.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::inverse {
 
 /// By place: the length of a vector whose components lie apart by the number of places.
 inline Eigen::ArrayXd lengths_of(const Eigen::VectorXd& x, Eigen::Index n_places) {
@@ -69,4 +69,4 @@ class GroupLasso {
   int n_steps_ = 0;
 };
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::inverse

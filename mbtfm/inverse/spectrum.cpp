@@ -1,15 +1,14 @@
-#include "mbtfm/tractions/spectrum.h"
+#include "mbtfm/inverse/spectrum.h"
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <random>
 #include <utility>
 #include <vector>
 
 #include "pipeline/numerics/dense.h"
 
-namespace mbtfm::tractions {
+namespace mbtfm::inverse {
 
 using Eigen::ArrayXd;
 
@@ -21,11 +20,15 @@ Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values) { return va
 
 }  // namespace
 
-Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double n_data)
+Spectrum spectrum_of(const MatrixXd& A, const VectorXd& u, double n_data, int threads) {
+  return {numerics::gram(A, threads), numerics::transposed_matvec(A, u), u.squaredNorm(), n_data};
+}
+
+Spectrum::Spectrum(MatrixXd normal, const VectorXd& adjoint, double data_squared, double n_data)
     : data_squared_(data_squared), n_data_(n_data) {
   auto [values, vectors] = numerics::symmetric_eigen(std::move(normal));
   vectors_ = std::make_shared<const MatrixXd>(std::move(vectors));
-  projected_ = numerics::transposed_matvec(*vectors_, pulled);
+  projected_ = numerics::transposed_matvec(*vectors_, adjoint);
   // Of fewer data than unknowns the other directions have values of rounding. The risk has them over lambda².
   const Eigen::Array<bool, Eigen::Dynamic, 1> felt = values.array() > kRounding * values.maxCoeff();
   values_ = felt.select(values.array(), 0);
@@ -40,27 +43,37 @@ Spectrum Spectrum::with_noise(double variance) const {
 }
 
 LambdaScan Spectrum::scan(std::optional<double> stated_variance, SignalIn signal_in) const {
-  const double largest = std::sqrt(values_.maxCoeff());
-  // At a tenth of the smallest singular value nothing is smoothed any more; where there are others it ends with them.
-  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), std::sqrt(kRounding) * largest);
-  std::vector<ScanPoint> points;
-  for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
-  // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
-  // for tractions that follow all but a few, would call most of it signal.)
-  const auto n_felt = static_cast<double>(is_felt(values_).count());
-  const Risks risks = [&](const std::vector<ScanPoint>& scanned, double variance) {
-    if (signal_in == SignalIn::told) return told_risks(scanned, variance);
-    std::vector<double> of_points;
-    for (const ScanPoint& p : scanned)
-      of_points.push_back(unbiased_risk(p, removable_misfit(p.lambda), n_felt, variance));
-    return of_points;
-  };
-  return judge(
-      std::move(points), n_data_, stated_variance,
-      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); }, risks);
+  return scan(
+      std::sqrt(kRounding), [this](double lambda) { return degrees(lambda); },
+      static_cast<double>(is_felt(values_).count()), stated_variance, signal_in);
 }
 
-Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
+LambdaScan Spectrum::scan(double smallest_part, const std::function<double(double)>& degrees_at, double n_felt,
+                          std::optional<double> stated_variance, SignalIn signal_in) const {
+  const double largest = std::sqrt(values_.maxCoeff());
+  // At a tenth of the smallest singular value nothing is smoothed any more; where there are others it ends with them.
+  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), smallest_part * largest);
+  std::vector<ScanPoint> points;
+  for (const double lambda : lambdas_between(largest, smallest))
+    points.push_back({.lambda = lambda,
+                      .misfit = misfit(lambda),
+                      .norm = (projected_ / (values_ + lambda * lambda)).square().sum(),
+                      .degrees = degrees_at(lambda)});
+  const Risks risks = [&](const std::vector<ScanPoint>& scanned, double variance) {
+    if (signal_in == SignalIn::resolved) return risks_of_resolved(scanned, variance);
+    std::vector<double> by_point;
+    for (const ScanPoint& p : scanned)
+      by_point.push_back(unbiased_risk(p, removable_misfit(p.lambda), n_felt, variance));
+    return by_point;
+  };
+  // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
+  // for tractions that follow all but a few, would call most of it signal.)
+  return judge(
+      std::move(points), n_data_, stated_variance,
+      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees_at(lambda)); }, risks);
+}
+
+Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_resolved(double variance) const {
   constexpr Index kLeast = 30;   // squares of noise whose sum is nearly Gaussian
   constexpr double kChance = 3;  // standard deviations of that sum
   const Eigen::Array<bool, Eigen::Dynamic, 1> felt = is_felt(values_);
@@ -71,29 +84,30 @@ Eigen::Array<bool, Eigen::Dynamic, 1> Spectrum::is_told(double variance) const {
   const auto n = std::ssize(order);
   std::vector<double> up_to = {0};  // sums of squares, each with this variance if it is noise
   for (const Index k : order) up_to.push_back(up_to.back() + projected_[k] * projected_[k] / values_[k]);
-  Eigen::Array<bool, Eigen::Dynamic, 1> told(values_.size());
-  told.setConstant(false);
+  Eigen::Array<bool, Eigen::Dynamic, 1> resolved(values_.size());
+  resolved.setConstant(false);
   for (Index k = 0; k < n; ++k) {
     const Index next = std::min(std::max(k, kLeast), n - k);
     const double squares = up_to[k + next] - up_to[k];
     const auto m = static_cast<double>(next);
     if (squares <= variance * (m + kChance * std::sqrt(2 * m))) break;
-    told[order[k]] = true;
+    resolved[order[k]] = true;
   }
-  return told;
+  return resolved;
 }
 
-std::vector<double> Spectrum::told_risks(const std::vector<ScanPoint>& points, double variance) const {
-  const Eigen::Array<bool, Eigen::Dynamic, 1> told = is_told(variance), felt = is_felt(values_);
-  const ArrayXd signal = told.select(projected_.square() / values_ - variance, 0);  // expected s sqrt(value), squared
+std::vector<double> Spectrum::risks_of_resolved(const std::vector<ScanPoint>& points, double variance) const {
+  const Eigen::Array<bool, Eigen::Dynamic, 1> resolved = is_resolved(variance), felt = is_felt(values_);
+  const ArrayXd signal =
+      resolved.select(projected_.square() / values_ - variance, 0);  // expected s sqrt(value), squared
   const ArrayXd squares =
-      told.select(projected_.square(), felt.select(variance * values_, ArrayXd::Zero(values_.size())));
-  std::vector<double> of_points;
+      resolved.select(projected_.square(), felt.select(variance * values_, ArrayXd::Zero(values_.size())));
+  std::vector<double> by_point;
   for (const ScanPoint& p : points) {
     const ArrayXd stiffness = values_ + p.lambda * p.lambda;
-    of_points.push_back((squares / stiffness.square() - 2 * signal / stiffness).sum());
+    by_point.push_back((squares / stiffness.square() - 2 * signal / stiffness).sum());
   }
-  return of_points;
+  return by_point;
 }
 
 std::optional<double> Spectrum::variance_felt_least() const {
@@ -118,11 +132,6 @@ std::optional<double> Spectrum::variance_felt_least() const {
   return least;
 }
 
-ScanPoint Spectrum::point_at(double lambda) const {
-  const ArrayXd shares = projected_ / (values_ + lambda * lambda);
-  return {.lambda = lambda, .misfit = misfit(lambda), .norm = shares.square().sum(), .degrees = degrees(lambda)};
-}
-
 double Spectrum::removable_misfit(double lambda) const {
   const ArrayXd shares = projected_ / (values_ + lambda * lambda);
   return is_felt(values_).select(shares.square() / values_, 0).sum() * std::pow(lambda, 4);
@@ -132,6 +141,11 @@ double Spectrum::explained(double lambda) const { return (projected_.square() / 
 
 VectorXd Spectrum::solve(double lambda) const {
   return numerics::matvec(*vectors_, (projected_ / (values_ + lambda * lambda)).matrix());
+}
+
+VectorXd Spectrum::solve(double lambda, const VectorXd& added) const {
+  const VectorXd right = projected_.matrix() + numerics::transposed_matvec(*vectors_, added);
+  return numerics::matvec(*vectors_, (right.array() / (values_ + lambda * lambda)).matrix());
 }
 
 MatrixXd Spectrum::outer(const ArrayXd& shares) const {
@@ -155,13 +169,12 @@ VectorXd Spectrum::error_variances(double lambda, double variance, double prior_
          ((variance * values_ + prior_variance * std::pow(lambda, 4)) / stiffness).matrix();
 }
 
-VectorXd Spectrum::resolved(double lambda) const {
-  return vectors_->array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
-}
-
-double Spectrum::misfit(double lambda) const {
-  const ArrayXd shares = projected_ / (values_ + lambda * lambda);
+double Spectrum::misfit_in_frame(const ArrayXd& shares) const {
   return data_squared_ - 2 * (shares * projected_).sum() + (values_ * shares.square()).sum();
+}
+double Spectrum::misfit(double lambda) const { return misfit_in_frame(projected_ / (values_ + lambda * lambda)); }
+double Spectrum::misfit_of(const VectorXd& s) const {
+  return misfit_in_frame(numerics::transposed_matvec(*vectors_, s).array());
 }
 
 double Spectrum::degrees(double lambda) const { return (values_ / (values_ + lambda * lambda)).sum(); }
@@ -169,10 +182,6 @@ double Spectrum::degrees(double lambda) const { return (values_ / (values_ + lam
 double Spectrum::relative_l2(double lambda) const {
   return data_squared_ > 0 ? std::sqrt(std::max(0.0, misfit(lambda)) / data_squared_) : 0;
 }
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 namespace {
 
@@ -183,9 +192,17 @@ struct Recurrence {
   double start = 0;  ///< length of the vector it starts from
   bool is_done = false;
 
-  /// Twice is enough (Parlett, The Symmetric Eigenvalue Problem, 6.9).
-  static void make_orthogonal(VectorXd& v, const MatrixXd& to, Index n) {
-    for (int pass = 0; pass < 2; ++pass) v -= to.leftCols(n) * (to.leftCols(n).transpose() * v);
+  /// Makes v column n of the basis: orthogonal to those before, of length one. @returns its length before; 0 where it
+  /// is what rounding left: then the recurrence is done. Twice is enough (Parlett, The Symmetric Eigenvalue
+  /// Problem, 6.9).
+  double append(VectorXd v, MatrixXd& basis, Index n) {
+    constexpr double kNothing = 1e-13;  // of the first
+    for (int pass = 0; pass < 2; ++pass) v -= basis.leftCols(n) * (basis.leftCols(n).transpose() * v);
+    const double length = v.norm();
+    is_done = !(length > kNothing * (alpha.empty() ? 0 : alpha.front()));
+    if (is_done) return 0;
+    basis.col(n) = v / length;
+    return length;
   }
   /// The problem in this basis, whose data is start e_1.
   Spectrum small(double n_data) const {
@@ -202,55 +219,41 @@ struct Recurrence {
 }  // namespace
 
 Recurrences::Recurrences(const LinearMap& map, const VectorXd& data, const RecurrenceOptions& options)
-    : n_data_(static_cast<double>(map.n_data)), n_felt_(static_cast<double>(std::min(map.n_data, map.n_unknowns))) {
-  constexpr double kNothing = 1e-13;  // of the first: what is left is rounding
-  const auto n = static_cast<std::size_t>(1 + options.probes);
+    : n_felt_(static_cast<double>(std::min(map.n_data, map.n_unknowns))) {
   const auto steps = std::min<Index>(options.steps, std::min(map.n_data, map.n_unknowns));
-  std::vector<Recurrence> all(n);
-  MatrixXd block(map.n_data, static_cast<Index>(n));
-  block.col(0) = data;
+  const Index n = 1 + options.probes;
   std::mt19937_64 random(options.seed);
-  for (Index k = 1; k < block.cols(); ++k) {
-    for (Index i = 0; i < map.n_data; ++i) block(i, k) = random() >> 63 ? 1 : -1;
-  }
-  for (std::size_t k = 0; k < n; ++k) {
-    Recurrence& r = all[k];
-    r.start = block.col(static_cast<Index>(k)).norm();
-    r.is_done = r.start == 0;
+  std::vector<Recurrence> all(static_cast<std::size_t>(n));
+  for (Recurrence& r : all) {
+    VectorXd first = data;
+    if (&r != &all.front())
+      for (double& sign : first) sign = random() >> 63 ? 1 : -1;
+    r.start = first.norm();
     r.left = MatrixXd::Zero(map.n_data, steps + 1);
     r.right = MatrixXd::Zero(map.n_unknowns, steps);
-    if (!r.is_done) r.left.col(0) = block.col(static_cast<Index>(k)) / r.start;
+    r.is_done = r.start == 0;
+    if (!r.is_done) r.left.col(0) = first / r.start;
   }
+  const auto side_by_side = [&](MatrixXd Recurrence::*basis, Index j) {
+    MatrixXd columns((all.front().*basis).rows(), n);
+    for (Index k = 0; k < n; ++k) columns.col(k) = (all[k].*basis).col(j);
+    return columns;
+  };
   for (Index j = 0; j < steps; ++j) {
-    for (std::size_t k = 0; k < n; ++k) block.col(static_cast<Index>(k)) = all[k].left.col(j);
-    MatrixXd pulled = map.transposed(block);
-    for (std::size_t k = 0; k < n; ++k) {
+    const MatrixXd adjoint = map.transposed(side_by_side(&Recurrence::left, j));
+    for (Index k = 0; k < n; ++k) {
       Recurrence& r = all[k];
-      if (r.is_done) continue;
-      VectorXd v = pulled.col(static_cast<Index>(k));
-      Recurrence::make_orthogonal(v, r.right, j);
-      const double alpha = v.norm();
-      r.is_done = !(alpha > kNothing * (r.alpha.empty() ? 0 : r.alpha.front())) || alpha == 0;
-      if (r.is_done) continue;
-      r.alpha.push_back(alpha);
-      r.right.col(j) = v / alpha;
+      const double alpha = r.is_done ? 0 : r.append(adjoint.col(k), r.right, j);
+      if (alpha > 0) r.alpha.push_back(alpha);
     }
-    MatrixXd right(map.n_unknowns, static_cast<Index>(n));
-    for (std::size_t k = 0; k < n; ++k) right.col(static_cast<Index>(k)) = all[k].right.col(j);
-    MatrixXd moved = map.forward(right);
-    for (std::size_t k = 0; k < n; ++k) {
+    const MatrixXd moved = map.forward(side_by_side(&Recurrence::right, j));
+    for (Index k = 0; k < n; ++k) {
       Recurrence& r = all[k];
-      if (r.is_done) continue;
-      VectorXd u = moved.col(static_cast<Index>(k));
-      Recurrence::make_orthogonal(u, r.left, j + 1);
-      const double beta = u.norm();
-      r.is_done = !(beta > kNothing * r.alpha.front());
-      r.beta.push_back(r.is_done ? 0 : beta);
-      if (!r.is_done) r.left.col(j + 1) = u / beta;
+      if (!r.is_done) r.beta.push_back(r.append(moved.col(k), r.left, j + 1));
     }
   }
   basis_ = all.front().right.leftCols(std::ssize(all.front().alpha));
-  for (const Recurrence& r : all) small_.push_back(r.small(n_data_));
+  for (const Recurrence& r : all) small_.push_back(r.small(static_cast<double>(map.n_data)));
 }
 
 double Recurrences::degrees(double lambda) const {
@@ -260,26 +263,10 @@ double Recurrences::degrees(double lambda) const {
 }
 
 LambdaScan Recurrences::scan(std::optional<double> stated_variance) const {
-  const Spectrum& data = small_.front();
   // the least values of the small problem have not settled: below a thousandth of the largest, lambda would hang on
   // them
-  const double largest = std::sqrt(data.values().maxCoeff());
-  const double smallest = std::max(0.1 * std::sqrt(data.values().minCoeff()), 1e-3 * largest);
-  std::vector<ScanPoint> points;
-  for (const double lambda : lambdas_between(largest, smallest)) {
-    ScanPoint point = data.point_at(lambda);
-    point.degrees = degrees(lambda);
-    points.push_back(point);
-  }
-  const Risks risks = [&](const std::vector<ScanPoint>& scanned, double variance) {
-    std::vector<double> values;
-    for (const ScanPoint& p : scanned)
-      values.push_back(unbiased_risk(p, data.removable_misfit(p.lambda), n_felt_, variance));
-    return values;
-  };
-  return judge(
-      std::move(points), n_data_, stated_variance,
-      [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); }, risks);
+  return small_.front().scan(
+      1e-3, [this](double lambda) { return degrees(lambda); }, n_felt_, stated_variance, SignalIn::felt);
 }
 
-}  // namespace mbtfm::tractions
+}  // namespace mbtfm::inverse
