@@ -72,7 +72,7 @@ MatrixXd displacement_by_ring(const LinearData& data, const Cell& cell, const Ge
 }  // namespace
 
 EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel) {
-  constexpr double kExpected = 0.1;  // of cells have such forces
+  constexpr double kExpected = 0.1, kOfFound = 0.25;
   if (are_assumed(cell.adhesions)) return {};
   const VectorXd forces_nN = adhesion_forces_nN(fit);
   double inward_nN = 0;
@@ -85,16 +85,19 @@ EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel)
   if (shape.size() == 0 || inward_nN <= 0) return {};
   const Left left(fit);
   const Scores scores = left.scores_of(pattern_of(fit.data, shape));
-  const double information = scores.information(0, 0), most_nN = total_nN(forces_nN);
+  const double information = scores.information(0, 0);
   if (!(information > 0)) return {};
-  const double sigma_nN = std::sqrt(left.variance() / information), z = scores.scores[0] / std::sqrt(information),
-               r = 1 / (1 + std::pow(sigma_nN / most_nN, 2)),
+  // 1.4 to 1.8 in simulated cells; of few adhesions it may be any number
+  const double per_inward = std::min(3.0, total_nN(forces_nN) / inward_nN),
+               z = scores.scores[0] / std::sqrt(information),
+               sigma_nN = per_inward * std::sqrt(left.variance() / information),
+               r = 1 / (1 + std::pow(sigma_nN / (kOfFound * total_nN(forces_nN)), 2)),
                log_factor = std::log(2 * std::sqrt(1 - r)) + 0.5 * r * z * z +
                             std::log(std::max(numerics::normal_below(std::sqrt(r) * z), 1e-300));
   return {.probability = 1 / (1 + (1 - kExpected) / kExpected * std::exp(-log_factor)),
-          .inward_nN = std::max(0.0, z * sigma_nN),
-          .sigma_nN = sigma_nN,
-          .per_inward = most_nN / inward_nN};
+          .sum_nN = std::max(0.0, r * z * sigma_nN),
+          .sigma_nN = std::sqrt(r) * sigma_nN,
+          .per_inward = per_inward};
 }
 
 EnsembleFit with_edge_forces(EnsembleFit fit, EdgeForces found, const Cell& cell, const Gel& gel, Index n_last) {
@@ -105,12 +108,12 @@ EnsembleFit with_edge_forces(EnsembleFit fit, EdgeForces found, const Cell& cell
     const VectorXd values =
         motion_in(fit.data, fit.data.displacement_um - fit.data.response->displace(adhesion_forces_nN(fit)));
     const Index at = values.size() - n_last - 1;
-    found.inward_nN = std::max(0.0, values[at]);
-    found.sigma_nN = motions_beside(fit.data, fit).sigma[at];
+    found.sum_nN = found.per_inward * std::max(0.0, values[at]);
+    found.sigma_nN = found.per_inward * motions_beside(fit.data, fit).sigma[at];
   }
   fit.forces.edge = found;
-  const double sum_nN = found.sum_nN(), p = found.probability,
-               squares = std::pow(found.per_inward * found.sigma_nN, 2) + 0.25 * sum_nN * sum_nN,
+  const double sum_nN = found.sum_nN, p = found.probability,
+               squares = found.sigma_nN * found.sigma_nN + 0.25 * sum_nN * sum_nN,
                variance = found.are_there() ? squares + (1 - p) * sum_nN * sum_nN : p * (squares + sum_nN * sum_nN);
   fit.forces.away_nN2 += variance;
   for (Estimate* sum : {&fit.total_force_nN, &fit.network_force_nN}) {

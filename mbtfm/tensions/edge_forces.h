@@ -12,16 +12,15 @@ namespace mbtfm::tensions {
 struct EnsembleFit;
 
 struct EdgeForces {
-  double probability = 0;              ///< that there are any
-  double inward_nN = 0, sigma_nN = 0;  ///< sum of their parts along the inward normal of the edge, if there are
-  double per_inward = 1;               ///< magnitudes of the forces at the adhesions over the same parts of these
+  double probability = 0;           ///< that there are any
+  double sum_nN = 0, sigma_nN = 0;  ///< of their magnitudes, if there are
+  double per_inward = 1;            ///< magnitudes over their parts along the inward normal, as at the adhesions
   bool are_there() const { return probability > 0.5; }
-  double sum_nN() const { return per_inward * inward_nN; }  ///< of their magnitudes
 };
 
 /// Of even forces on free places as near to the edge as three in four of the adhesions, inwards along its normal. Their
-/// sum a is expected in one cell of ten, anywhere between nothing and the sum of the forces that were found. With the
-/// score test's â and σ (search.h), τ the latter sum and r = τ²/(τ² + σ²),
+/// sum a is expected in one cell of ten, |N(0, τ²)| with τ a quarter of the sum of the forces that were found. With the
+/// score test's â and σ (search.h) and r = τ²/(τ² + σ²),
 ///
 ///   B = 2 √(1 − r) exp(r â²/2σ²) Φ(√r â/σ),   probability = B / (9 + B).
 EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel);

@@ -215,7 +215,7 @@ Noticed missing_adhesions_noticed(const FitOutcome& o) {
 
 Noticed edge_forces_noticed(const FitOutcome& o) {
   const EdgeForces& edge = o.fit.forces.edge;
-  return noticed(Symptom::edge_forces, edge.probability, {.at = brief(edge.sum_nN()) + " nN"});
+  return noticed(Symptom::edge_forces, edge.probability, {.at = brief(edge.sum_nN) + " nN"});
 }
 
 Noticed fibres_without_tension(const FitOutcome& o) {

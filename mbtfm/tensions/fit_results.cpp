@@ -163,7 +163,7 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
             {"force_beside_network_nN",
              std::sqrt(2 * beside_nN.squaredNorm() / static_cast<double>(std::max<Index>(1, beside_nN.size())))},
             {"network_explains", 1 - beside_nN.squaredNorm() / std::max(exerted_nN.squaredNorm(), 1e-300)},
-            {"edge_force_nN", fit.forces.edge.sum_nN()},
+            {"edge_force_nN", fit.forces.edge.sum_nN},
             {"edge_force_probability", fit.forces.edge.probability},
             {"net_force_over_total", balance.force},
             {"net_torque_over_total", balance.torque},
