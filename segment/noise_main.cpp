@@ -9,7 +9,7 @@
 #include "pipeline/stage/stage.h"
 #include "segment/beads/report.h"
 #include "segment/beads/unloaded.h"
-#include "segment/images/channels.h"
+#include "segment/images/stage_images.h"
 
 namespace mbtfm::beads {
 namespace {

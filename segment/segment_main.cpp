@@ -11,6 +11,7 @@
 #include "segment/cells/contact_sheet.h"
 #include "segment/cells/overlay.h"
 #include "segment/cells/report.h"
+#include "segment/images/stage_images.h"
 
 namespace mbtfm::cells {
 namespace {

@@ -1,7 +1,6 @@
 #include "substrate/compliance.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"

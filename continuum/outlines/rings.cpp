@@ -5,7 +5,6 @@
 
 #include "continuum/sheet/curve.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/polyline.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/sheet_files.h"
 #include "pipeline/files/tables.h"

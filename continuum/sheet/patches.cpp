@@ -10,7 +10,6 @@
 #include "pipeline/numerics/neighbour_bins.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
-#include "substrate/loads.h"
 #include "substrate/response.h"
 
 namespace mbtfm::sheet {

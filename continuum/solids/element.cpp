@@ -6,7 +6,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/quadrature.h"
 
 namespace mbtfm::solids {

@@ -9,7 +9,6 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tractions/neighbour_noise.h"
-#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"

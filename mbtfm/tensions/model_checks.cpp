@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <random>
 
 #include "mbtfm/tensions/search.h"

@@ -1,7 +1,6 @@
 /// The criteria that choose lambda, side by side, as one file.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/charts/chart.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "network/mesh/polyline.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/numerics/neighbour_bins.h"
 

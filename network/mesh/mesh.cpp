@@ -8,12 +8,9 @@
 #include <set>
 #include <tuple>
 
-#include "network/mesh/adhesions.h"
 #include "network/mesh/frame.h"
 #include "network/mesh/links.h"
 #include "network/mesh/relax.h"
-#include "pipeline/contract/errors.h"
-#include "pipeline/numerics/memory.h"
 #include "pipeline/numerics/neighbour_bins.h"
 #include "pipeline/stage/parameters.h"
 

@@ -1,9 +1,10 @@
 /// The sentences of pages are data: texts.txt.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <string>
+#include <type_traits>
+#include <variant>
+#include <vector>
 
 namespace mbtfm::report {
 
@@ -11,10 +12,21 @@ namespace mbtfm::report {
 /// @throws std::logic_error if there is no such text
 std::string text_of(const std::string& name);
 
+using Value = std::variant<double, long long, std::string>;
+template <class T>
+Value value_of(const T& value) {
+  if constexpr (std::is_integral_v<T>)
+    return static_cast<long long>(value);
+  else if constexpr (std::is_floating_point_v<T>)
+    return static_cast<double>(value);
+  else
+    return std::string(value);
+}
 /// Its {} are filled as by fmt::format.
+std::string filled(const std::string& name, const std::vector<Value>& values);
 template <class... Values>
 std::string sentence(const char* name, const Values&... values) {
-  return fmt::vformat(text_of(name), fmt::make_format_args(values...));
+  return filled(name, {value_of(values)...});
 }
 
 /// The same as HTML: a paragraph, and a small one.

@@ -1,6 +1,5 @@
 #include "samples/drawing/rough_day.h"
 
-#include <array>
 #include <cmath>
 #include <numbers>
 

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 
 #include "pipeline/charts/chart.h"
 #include "pipeline/report/stage_page.h"

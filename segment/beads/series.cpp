@@ -11,7 +11,7 @@
 #include "pipeline/files/names.h"
 #include "pipeline/files/tables.h"
 #include "segment/beads/pair_look.h"
-#include "segment/images/channels.h"
+#include "segment/images/stage_images.h"
 
 namespace mbtfm::beads {
 

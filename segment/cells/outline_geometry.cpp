@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "segment/cells/outline.h"

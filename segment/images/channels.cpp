@@ -6,7 +6,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/stage/stage.h"
+#include "segment/images/stage_images.h"
 
 namespace mbtfm::images {
 

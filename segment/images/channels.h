@@ -9,10 +9,6 @@
 #include "pipeline/stage/plausible.h"
 #include "segment/images/image.h"
 
-namespace mbtfm::stage {
-class StageContext;
-}
-
 namespace mbtfm::images {
 
 /// An image and the name by which errors call it.
@@ -77,12 +73,5 @@ Image without_scan_phase(const Image& image, double phase_px);
 
 /// Take the phase off if there is one, and say so.
 std::optional<Finding> take_scan_phase_off(Channel& channel);
-
-/// An image of a stage: its scan phase is taken off, and noticed, before it is binned.
-/// @param binning  side of the blocks of pixels that are averaged; 1: none
-Channel read_channel(const std::string& name, const std::filesystem::path& file, const PlaneChoice& plane, int binning,
-                     stage::StageContext& context);
-/// Notice what noticed_in() finds, and doubt the pixel size that was given for it.
-void notice_image(const Channel& channel, std::optional<double> given_um, stage::StageContext& context);
 
 }  // namespace mbtfm::images

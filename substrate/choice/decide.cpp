@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/errors.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/surface.h"

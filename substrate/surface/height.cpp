@@ -3,7 +3,6 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace mbtfm::surface {
 namespace {

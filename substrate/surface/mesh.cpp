@@ -6,7 +6,6 @@
 #include <limits>
 #include <numeric>
 #include <ranges>
-#include <string>
 #include <utility>
 
 #include "pipeline/contract/errors.h"

@@ -1,6 +1,5 @@
 #include "substrate/surface/voxels.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>

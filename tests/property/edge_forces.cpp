@@ -13,12 +13,12 @@ using test::TensionScene;
 struct DimlyHeld {
   static constexpr int kAdhesions = 12;
   Cell cell = test::round_cell(12, kAdhesions);
-  TensionScene scene;
+  TensionScene scene = scene_of(cell);
 
-  DimlyHeld() {
+  static TensionScene scene_of(Cell& cell) {
     test::add_ventral(cell, 1, 5);
     test::add_ventral(cell, 2, 7);
-    scene = test::scene_of(cell, Eigen::Vector3d(0.1, 6, 3), 3000, 0.05, 5);
+    return test::scene_of(cell, Eigen::Vector3d(0.1, 6, 3), 3000, 0.05, 5);
   }
   void pull_inwards(double sum_nN) {
     const Vec2 middle = centre_of(cell.outline_um);
