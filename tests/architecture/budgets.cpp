@@ -11,15 +11,15 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105740;
-constexpr int kLinesOfTests = 45330;
-constexpr int kLongSources = 14;                                                  // .cpp of the product above 400 lines
-constexpr int kLongestSource = 650;                                               // lines
-constexpr int kOwnHeadersMedian = 16, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
+constexpr int kLinesOfProduct = 105310;
+constexpr int kLinesOfTests = 45590;
+constexpr int kLongSources = 11;                                                  // .cpp of the product above 400 lines
+constexpr int kLongestSource = 570;                                               // lines
+constexpr int kOwnHeadersMedian = 17, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
 constexpr int kSeeFindings = 35;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 55;
 constexpr int kParameterRows = 278;  // of build/docs/parameters.md
-constexpr int kWordsOfDocs = 51960;
+constexpr int kWordsOfDocs = 52240;
 
 const std::vector<std::string> kProduct = {"pipeline", "segment",   "network", "substrate",
                                            "mbtfm",    "continuum", "samples"};
