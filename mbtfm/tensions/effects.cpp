@@ -1,6 +1,5 @@
 #include "mbtfm/tensions/effects.h"
 
-
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/kinds_of_effects.h"
 #include "pipeline/contract/numbers.h"
