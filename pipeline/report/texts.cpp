@@ -15,9 +15,9 @@ std::string text_of(const std::string& name) {
   return texts.at(name.substr(0, point), name.substr(point + 1));
 }
 
-std::string filled(const std::string& name, const std::vector<Value>& values) {
+std::string filled(const std::string& name, const std::vector<TextValue>& values) {
   fmt::dynamic_format_arg_store<fmt::format_context> arguments;
-  for (const Value& value : values) std::visit([&](const auto& v) { arguments.push_back(v); }, value);
+  for (const TextValue& value : values) std::visit([&](const auto& v) { arguments.push_back(v); }, value);
   return fmt::vformat(text_of(name), arguments);
 }
 

@@ -12,9 +12,9 @@ namespace mbtfm::report {
 /// @throws std::logic_error if there is no such text
 std::string text_of(const std::string& name);
 
-using Value = std::variant<double, long long, std::string>;
+using TextValue = std::variant<double, long long, std::string>;
 template <class T>
-Value value_of(const T& value) {
+TextValue text_value(const T& value) {
   if constexpr (std::is_integral_v<T>)
     return static_cast<long long>(value);
   else if constexpr (std::is_floating_point_v<T>)
@@ -23,10 +23,10 @@ Value value_of(const T& value) {
     return std::string(value);
 }
 /// Its {} are filled as by fmt::format.
-std::string filled(const std::string& name, const std::vector<Value>& values);
+std::string filled(const std::string& name, const std::vector<TextValue>& values);
 template <class... Values>
 std::string sentence(const char* name, const Values&... values) {
-  return filled(name, {value_of(values)...});
+  return filled(name, {text_value(values)...});
 }
 
 /// The same as HTML: a paragraph, and a small one.
