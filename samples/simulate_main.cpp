@@ -3,7 +3,6 @@
 #include <string_view>
 
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/own_files.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "samples/colonies/colony.h"
@@ -39,22 +38,6 @@ void set_scenario(stage::ParameterList& list, drawing::ScenarioParameters& cell,
     cell = drawing::rough_day(cell, number);
 }
 
-/// @throws UsageError if the folder holds what no simulation made: a cell of the user's own
-void expect_simulated(const std::filesystem::path& cell) {
-  if (files::is_file(cell / "truth/scenario.toml")) return;
-  for (const char* name : {"cell.toml", "paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif",
-                           "surface_beads.tif", "surface.vtp", "1_segment", "2_track", "truth"})
-    if (std::filesystem::exists(std::filesystem::symlink_status(cell / name)))
-      throw UsageError((cell / name).string() +
-                       " is there, and no simulation made it: nothing is written over it; name a new folder");
-}
-
-/// Images beside the true segmentation of an earlier experiment would never be looked at: it would pass for the user's.
-void refuse_given_segmentation(const std::filesystem::path& cell) {
-  if (std::filesystem::exists(cell / "1_segment") && !std::filesystem::exists(cell / "run.json"))
-    throw UsageError(cell.string() + " holds an experiment without images: choose another folder or remove it");
-}
-
 struct SimulateParameters {
   bool force = false;  ///< what an earlier simulation made is written over
   drawing::ScenarioParameters cell;
@@ -77,20 +60,7 @@ StageReport run_in_space(const SimulateParameters& p, stage::StageContext& conte
   const auto file = [&](const std::string& name) { return context.output("out", name); };
   gels::write_folder(scene, p.space, p.cell, file);
   if (p.cell.images) gels::write_stacks(scene, p.space, p.cell, file, context.threads, context.progress);
-  double total_nN = 0;
-  for (const gels::Patch& patch : scene.patches) total_nN += norm(patch.force_nN);
-  StageReport report;
-  report.figures = {{"n_beads", static_cast<std::int64_t>(scene.truth.size())},
-                    {"n_patches", static_cast<std::int64_t>(scene.patches.size())},
-                    {"n_sources", static_cast<std::int64_t>(scene.sources.size())},
-                    {"total_force_nN", total_nN},
-                    {"largest_displacement_um", scene.largest_displacement_um},
-                    {"noise_um", scene.noise_um},
-                    {"share_beside_patches", scene.share_beside_patches}};
-  report.summary = std::string(name_of(p.space.scene)) + ": " + std::to_string(scene.patches.size()) +
-                   " patches, whose forces are " + brief(total_nN) + " nN in all, largest displacement " +
-                   brief(scene.largest_displacement_um) + " um, " + std::to_string(scene.truth.size()) + " beads";
-  return report;
+  return gels::report_of(scene, p.space.scene);
 }
 
 /// Below the output: the folder itself where there is one colony, else colony_001 and so on.
@@ -157,18 +127,7 @@ StageReport run(const SimulateParameters& all, stage::StageContext& context) {
   const auto file = [&](const std::string& name) { return context.output("out", name); };
   experiment::write_cell_folder(experiment, parameters, file);
   if (parameters.images) experiment::write_images(experiment, parameters, file, work);
-  StageReport report;
-  report.figures = {{"n_adhesions", static_cast<std::int64_t>(experiment.cell.adhesions.size())},
-                    {"n_fibres", static_cast<std::int64_t>(experiment.cell.fibres.size())},
-                    {"n_vertices", static_cast<std::int64_t>(experiment.network.vertices_um.size())},
-                    {"total_force_nN", experiment.total_force_nN},
-                    {"largest_displacement_um", experiment.largest_displacement_um},
-                    {"noise_um", experiment.noise_um}};
-  report.summary = parameters.scenario + ": " + std::to_string(experiment.cell.adhesions.size()) + " adhesions, " +
-                   std::to_string(experiment.cell.fibres.size()) + " fibres, total force " +
-                   brief(experiment.total_force_nN) + " nN, largest displacement " +
-                   brief(experiment.largest_displacement_um) + " um, noise " + brief(experiment.noise_um) + " um";
-  return report;
+  return experiment::report_of(experiment, parameters.scenario);
 }
 
 }  // namespace

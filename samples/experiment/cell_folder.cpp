@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <string>
 
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/parameters.h"
@@ -46,6 +49,20 @@ void add(images::Image& image, const images::Image& other) {
 }
 
 }  // namespace
+
+void expect_simulated(const std::filesystem::path& cell) {
+  if (files::is_file(cell / "truth/scenario.toml")) return;
+  for (const char* name : {"cell.toml", "paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif",
+                           "surface_beads.tif", "surface.vtp", "1_segment", "2_track", "truth"})
+    if (std::filesystem::exists(std::filesystem::symlink_status(cell / name)))
+      throw UsageError((cell / name).string() +
+                       " is there, and no simulation made it: nothing is written over it; name a new folder");
+}
+
+void refuse_given_segmentation(const std::filesystem::path& cell) {
+  if (std::filesystem::exists(cell / "1_segment") && !std::filesystem::exists(cell / "run.json"))
+    throw UsageError(cell.string() + " holds an experiment without images: choose another folder or remove it");
+}
 
 void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& parameters, const FileNamer& file) {
   drawing::ScenarioParameters copy = parameters;
@@ -103,6 +120,21 @@ void write_images(const Experiment& e, const drawing::ScenarioParameters& p, con
   DisplacementField beads = e.measured;
   beads.insert(beads.end(), e.beyond.begin(), e.beyond.end());
   write_bead_images(beads, p, file, work);
+}
+
+StageReport report_of(const Experiment& e, const std::string& scenario) {
+  StageReport report;
+  report.figures = {{"n_adhesions", static_cast<std::int64_t>(e.cell.adhesions.size())},
+                    {"n_fibres", static_cast<std::int64_t>(e.cell.fibres.size())},
+                    {"n_vertices", static_cast<std::int64_t>(e.network.vertices_um.size())},
+                    {"total_force_nN", e.total_force_nN},
+                    {"largest_displacement_um", e.largest_displacement_um},
+                    {"noise_um", e.noise_um}};
+  report.summary = scenario + ": " + std::to_string(e.cell.adhesions.size()) + " adhesions, " +
+                   std::to_string(e.cell.fibres.size()) + " fibres, total force " + brief(e.total_force_nN) +
+                   " nN, largest displacement " + brief(e.largest_displacement_um) + " um, noise " + brief(e.noise_um) +
+                   " um";
+  return report;
 }
 
 }  // namespace mbtfm::experiment

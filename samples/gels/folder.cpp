@@ -165,4 +165,21 @@ void write_stacks(const GelScene& scene, const SpaceParameters& space, const dra
   if (!on_surface.empty()) write("surface_beads.tif", on_surface, of_relaxed, 2);
 }
 
+StageReport report_of(const GelScene& scene, SpaceScene kind) {
+  double total_nN = 0;
+  for (const Patch& patch : scene.patches) total_nN += norm(patch.force_nN);
+  StageReport report;
+  report.figures = {{"n_beads", static_cast<std::int64_t>(scene.truth.size())},
+                    {"n_patches", static_cast<std::int64_t>(scene.patches.size())},
+                    {"n_sources", static_cast<std::int64_t>(scene.sources.size())},
+                    {"total_force_nN", total_nN},
+                    {"largest_displacement_um", scene.largest_displacement_um},
+                    {"noise_um", scene.noise_um},
+                    {"share_beside_patches", scene.share_beside_patches}};
+  report.summary = std::string(name_of(kind)) + ": " + std::to_string(scene.patches.size()) +
+                   " patches, whose forces are " + brief(total_nN) + " nN in all, largest displacement " +
+                   brief(scene.largest_displacement_um) + " um, " + std::to_string(scene.truth.size()) + " beads";
+  return report;
+}
+
 }  // namespace mbtfm::gels

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "pipeline/contract/stage_report.h"
 #include "pipeline/contract/work.h"
 #include "samples/drawing/scenario.h"
 #include "samples/gels/scene.h"
@@ -22,5 +23,7 @@ void write_folder(const GelScene& scene, const SpaceParameters& space, const dra
 /// The stacks of beads; those of the gel's surface where there are such beads; truth/slices.csv.
 void write_stacks(const GelScene& scene, const SpaceParameters& space, const drawing::ScenarioParameters& parameters,
                   const FileNamer& file, int threads, const Progress& progress);
+
+StageReport report_of(const GelScene& scene, SpaceScene kind);
 
 }  // namespace mbtfm::gels
