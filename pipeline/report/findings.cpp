@@ -164,8 +164,8 @@ std::string energy_and_moment(const CellResults& results) {
              minor = figure_of(fit, "contractile_moment_minor_nN_um"),
              axis = figure_of(fit, "contractile_moment_axis_deg");
   if (moment && moment_sigma && major && minor && axis) {
-    text +=
-        sentence("cell.moment", with_error(*moment, *moment_sigma, "nN µm"), readable(*major), *axis, readable(*minor));
+    text += sentence("cell.moment", with_error(*moment, *moment_sigma, "nN µm"), readable(*major), *axis,
+                     readable(std::abs(*minor) < 1e-9 * std::abs(*major) ? 0 : *minor));  // or it is rounding
   }
   return text;
 }
