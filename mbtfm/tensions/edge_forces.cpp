@@ -13,6 +13,7 @@
 #include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "substrate/greens/models.h"
+#include "substrate/models.h"
 
 namespace mbtfm::tensions {
 
@@ -44,7 +45,7 @@ Ring ring_along_edge(const Cell& cell) {
       const Vec2 place{x, y};
       const double edge_um = distance_to_boundary_um(cell.outline_um, place);
       if (edge_um <= 0 || edge_um > depth_um || !is_free(cell, place)) continue;
-      if (!cuts_of(cell).empty() && distance_to_cut_um(cell, place) <= edge_um) continue;  // the cell goes on there
+      if (distance_to_cut_um(cell, place) <= edge_um) continue;  // the cell goes on there
       ring.discs.push_back(
           {.centre_um = place, .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
       ring.forces_nN.push_back(inward_normal(cell, place));
@@ -61,12 +62,9 @@ Ring ring_along_edge(const Cell& cell) {
 MatrixXd displacement_by_ring(const LinearData& data, const Cell& cell, const Gel& gel) {
   const Ring ring = ring_along_edge(cell);
   if (ring.discs.empty()) return {};
-  VectorXd forces_nN(2 * std::ssize(ring.forces_nN));
-  for (Index k = 0; k < std::ssize(ring.forces_nN); ++k)
-    forces_nN.segment<2>(2 * k) << ring.forces_nN[k].x, ring.forces_nN[k].y;
   return numerics::matvec(greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
                               ->compliance_um_per_nN(data.position_um, ring.discs),
-                          forces_nN);
+                          substrate::column_of(ring.forces_nN));
 }
 
 }  // namespace
@@ -102,14 +100,9 @@ EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel)
 
 EnsembleFit with_edge_forces(EnsembleFit fit, EdgeForces found, const Cell& cell, const Gel& gel, Index n_last) {
   if (found.are_there()) {
-    LinearData data = std::move(fit.data);
-    Motions motions = joined_ahead(data.motions, n_last, {.shapes = displacement_by_ring(data, cell, gel)});
-    fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
-    const VectorXd values =
-        motion_in(fit.data, fit.data.displacement_um - fit.data.response->displace(adhesion_forces_nN(fit)));
-    const Index at = values.size() - n_last - 1;
-    found.sum_nN = found.per_inward * std::max(0.0, values[at]);
-    found.sigma_nN = found.per_inward * motions_beside(fit.data, fit).sigma[at];
+    const MotionsBeside beside = find_forces_beside(fit, displacement_by_ring(fit.data, cell, gel), n_last);
+    found.sum_nN = found.per_inward * std::max(0.0, beside.values[0]);
+    found.sigma_nN = found.per_inward * beside.sigma[0];
   }
   fit.forces.edge = found;
   const double sum_nN = found.sum_nN, p = found.probability,

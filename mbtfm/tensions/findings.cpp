@@ -213,11 +213,6 @@ Noticed missing_adhesions_noticed(const FitOutcome& o) {
   return noticed(Symptom::missing_adhesion, static_cast<double>(missing.size()), {.at = places});
 }
 
-Noticed edge_forces_noticed(const FitOutcome& o) {
-  const EdgeForces& edge = o.fit.forces.edge;
-  return noticed(Symptom::edge_forces, edge.probability, {.at = brief(edge.sum_nN) + " nN"});
-}
-
 Noticed fibres_without_tension(const FitOutcome& o) {
   std::vector<int> ids;
   for (const Fibre& fibre : o.cell.fibres) {
@@ -346,6 +341,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
   const auto is_wide = [](const Tension& t) { return t.identifiable && t.tension_nN > 0 && is_uncertain(t); };
   Noticed cause = missing_fibres_noticed(o), then = missing_adhesions_noticed(o);
   if (explains_more(o.missing_adhesions, o.missing)) std::swap(cause, then);
+  const EdgeForces& edge = o.fit.forces.edge;
   std::vector<Finding> findings;
   for (Noticed found :
        {cell_cut(o),
@@ -355,7 +351,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
         channel_shift(o),
         std::move(cause),
         std::move(then),
-        edge_forces_noticed(o),
+        noticed(Symptom::edge_forces, edge.probability, {.at = brief(edge.sum_nN) + " nN"}),
         noticed_of(Symptom::adhesions_without_beads, adhesions_without_beads(o.cell.adhesions, o.data.position_um)),
         explains_little(o),
         unexplained(o),

@@ -265,20 +265,26 @@ bool are_assumed(const std::vector<Adhesion>& adhesions) {
   return std::ranges::all_of(adhesions, [](const Adhesion& a) { return is_assumed(a.origin); });
 }
 
+MotionsBeside find_forces_beside(EnsembleFit& fit, MatrixXd shapes, Index n_last) {
+  const Index n = shapes.cols();
+  LinearData data = std::move(fit.data);
+  Motions motions = joined_ahead(data.motions, n_last, {.shapes = std::move(shapes)});
+  fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
+  const VectorXd sigma = motions_beside(fit.data, fit).sigma,
+                 values = motion_in(fit.data,
+                                    fit.data.displacement_um - fit.data.response->displace(adhesion_forces_nN(fit)));
+  const Index first = values.size() - n_last - n;
+  return {values.segment(first, n), sigma.segment(first, n)};
+}
+
 EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last) {
   std::vector<Vec2> there;
   for (const MissingAdhesion& place : places) there.push_back(place.position_um);
-  LinearData data = std::move(fit.data);
-  Motions motions = joined_ahead(data.motions, n_last, {.shapes = displacement_by(there, data, gel)});
-  fit = with_forces_by(std::move(fit), with_motions(std::move(data), std::move(motions)));
-  const VectorXd errors = motions_beside(fit.data, fit).sigma,
-                 values = motion_in(fit.data,
-                                    fit.data.displacement_um - fit.data.response->displace(adhesion_forces_nN(fit)));
-  const Index first = values.size() - n_last - 2 * std::ssize(places);
+  const MotionsBeside found = find_forces_beside(fit, displacement_by(there, fit.data, gel), n_last);
   fit.forces.away_nN2 = 0;
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const Eigen::Vector2d force = values.segment<2>(first + 2 * static_cast<Index>(k)),
-                          sigma = errors.segment<2>(first + 2 * static_cast<Index>(k));
+    const Eigen::Vector2d force = found.values.segment<2>(2 * static_cast<Index>(k)),
+                          sigma = found.sigma.segment<2>(2 * static_cast<Index>(k));
     places[k].force_nN = {force.x(), force.y()};
     places[k].chi_squared_gain = force.cwiseQuotient(sigma).squaredNorm();
     const double along = force.normalized().cwiseProduct(sigma).norm();

@@ -11,6 +11,7 @@
 namespace mbtfm::tensions {
 
 struct EnsembleFit;
+struct MotionsBeside;
 
 /// Whether it lies in the cell, and an adhesion there is none of those that were found.
 bool is_free(const Cell& cell, Vec2 place_um);
@@ -22,6 +23,12 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cel
 
 /// None of the adhesions was seen: they stand for forces that nobody knows the places of.
 bool are_assumed(const std::vector<Adhesion>& adhesions);
+
+/// The adhesions' forces again, beside these displacements of the beads, of any sizes; the tensions stay.
+/// @param shapes  2·beads × some
+/// @param n_last  motions of the data that stay the last ones
+/// @returns the sizes
+MotionsBeside find_forces_beside(EnsembleFit& fit, MatrixXd shapes, Index n_last);
 
 /// The fit of a cell that pulls at these places, too: the adhesions' forces beside theirs, and the total with them.
 /// @param places  their forces and gains become what the fit finds

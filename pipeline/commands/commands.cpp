@@ -73,7 +73,7 @@ void expect_tensions(const fs::path& cell) {
                    (of.kind == CellKind::space ? ", and --preset sets how much is computed" : ""));
 }
 
-/// Presets are tried without a report; the last of them is then found up to date, and told of with what it reached.
+/// Presets are tried without a report; the last one is then up to date, and reported with the accuracy it reached.
 runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
   const double wanted = cost::parse_accuracy(line.accuracy);
   const std::function<void()> write_report = std::exchange(options.finish, nullptr);
@@ -98,12 +98,12 @@ runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions 
   return runner::run_cell(line.folder, options);
 }
 
-/// The stages leave it to us to tell of them.
+/// This program reports on the stages; they print nothing of their own.
 void speak_for_stages(const CommandLine& line) {
   setenv(stage::kRunnerVariable, line.is_json ? stage::kForProgram : stage::kForPerson, 1);
 }
 
-/// Of a time series: 4_fit/series.png, anew after each fit.
+/// Of a time series: 4_fit/series.png, made again after each fit.
 void animate(const CommandLine& line) {
   const fs::path frames = line.folder / "4_fit/frames.csv", picture = line.folder / "4_fit/series.png",
                  program = line.run.stage_folder / "mbtfm-animate";
