@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Would the suite see a fault? Plants those of tests/mutations.txt, one at a time, in a copy of the sources, builds the
-# tests that should see each, and tells which does. By hand: it builds some thirty tests before the first fault.
+# tests that should see each, and says which does. By hand: it builds the test programs before the first fault.
 #   tests/mutations.sh [--list] [NUMBER | FOLDER]...    which faults; none named: all
 # MBTFM_MUTATIONS is the folder of copy and build (build-mutations), CMAKE_BUILD_PARALLEL_LEVEL the compilers at once.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-work=${MBTFM_MUTATIONS:-build-mutations}
+work=$(realpath -m "${MBTFM_MUTATIONS:-build-mutations}")
 list=tests/mutations.txt
 longest_s=900  # a fault may keep a loop from ending
 
@@ -48,7 +48,8 @@ copy_sources() {
       mkdir -p "$work/source/$(dirname "$file")"
       cp "$file" "$work/source/$file"
     done
-  cmake -S "$work/source" -B "$work/source/build" -G Ninja -DCMAKE_BUILD_TYPE=Release >"$work/configure.log"
+  cmake -S "$work/source" -B "$work/source/build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_EXE_LINKER_FLAGS=-Wl,-z,muldefs ${MBTFM_STRICT:+-DMBTFM_STRICT=$MBTFM_STRICT} >"$work/configure.log"
 }
 
 build() { nice -n 19 cmake --build "$work/source/build" --target "$@" -j "${CMAKE_BUILD_PARALLEL_LEVEL:-1}" >"$work/build.log" 2>&1; }
@@ -67,7 +68,6 @@ failed_test() {
 # once is known by the program that was run.
 fails_without() {
   local failed known
-  [ -z "${passed[$1]:-}" ] || return 1
   build "${1%%:*}" || { echo "${1%%:*} does not build without any fault"; return; }
   known="$1 $(sha256sum <"$work/source/build/tests/${1%%:*}")"
   if ! grep -qxF -- "$known" "$work/passed"; then
@@ -83,22 +83,49 @@ plant() {
     exit 3 if (() = $text =~ /\Q$old\E/g) != 1; $text =~ s/\Q$old\E/$new/; open(my $out, ">", $file); print $out $text' "$@"
 }
 
+# Compiles $work/planted.cpp in place of source $1, alone, and puts it first into the library: what it defines counts (-z
+# muldefs), and the sources that are compiled together with it are not compiled again. False where $1 is in no library.
+add_object() {
+  local together target command
+  together=$(grep -rlF --include='unity_*.cxx' "/$1\"" "$work/source/build" | head -n 1)
+  target=$(basename "${together%.dir/Unity/*}")
+  library=${together%%/CMakeFiles/*}/lib$target.a
+  [ -n "$together" ] && [ -f "$library" ] || return 1
+  command=$(ninja -C "$work/source/build" -t commands -s "${together#"$work/source/build/"}.o" |
+    sed "s# -Werror # #; s# -MD -MT [^ ]* -MF [^ ]*##; s# -o .*# -o $work/planted.o -c $work/planted.cpp#" | tail -n 1)
+  (cd "$work/source/build" && eval "nice -n 19 $command" && ar rcsb "$(ar t "$library" | head -n 1)" "$library" "$work/planted.o") \
+    >"$work/build.log" 2>&1
+}
+remove_object() { ar d "$library" planted.o && ranlib "$library"; }
+
+# Sets `outcome` to what test $2 makes of fault $1, which is in $work/planted.cpp. An object of its own is quick, but a call
+# that was inlined elsewhere does not see it: what survives so is built properly.
+judge() {
+  local failed target=${2%%:*} file=${files[$1]}
+  outcome=survived
+  if [[ $file == *.cpp ]] && add_object "$file"; then
+    if build "$target" && failed=$(failed_test "$2"); then outcome="caught by $target: $failed"; fi
+    remove_object
+  fi
+  [ "$outcome" = survived ] || return 0
+  cp "$work/source/$file" "$work/original"
+  cp "$work/planted.cpp" "$work/source/$file"
+  if ! build "$target"; then
+    outcome='does not build'
+  elif failed=$(failed_test "$2"); then
+    outcome="caught by $target: $failed"
+  fi
+  cp "$work/original" "$work/source/$file"
+}
+
 # Sets `outcome` to what became of fault $1.
 try_fault() {
-  local i=$1 test failed
-  local file=$work/source/${files[i]}
-  outcome=survived
+  local i=$1 test
+  cp "$work/source/${files[i]}" "$work/planted.cpp"
+  if ! plant "$work/planted.cpp" "${olds[i]}" "${news[i]}"; then outcome='stale: the old text is not there once'; return; fi
   for test in ${seen_by[i]}; do
-    if failed=$(fails_without "$test"); then outcome=$failed; return; fi
-    passed[$test]=yes
-    cp "$file" "$work/original"
-    if ! plant "$file" "${olds[i]}" "${news[i]}"; then outcome='stale: the old text is not there once'; return; fi
-    if ! build "${test%%:*}"; then
-      outcome='does not build'
-    elif failed=$(failed_test "$test"); then
-      outcome="caught by ${test%%:*}: $failed"
-    fi
-    cp "$work/original" "$file"
+    if [ -n "${broken[$test]:-}" ]; then outcome=${broken[$test]}; return; fi
+    judge "$i" "$test"
     [ "$outcome" = survived ] || return 0
   done
 }
@@ -111,9 +138,12 @@ if [ "${1:-}" = --list ]; then
 fi
 mapfile -t which < <(chosen "$@")
 [ ${#which[@]} -gt 0 ] || { echo "no fault is named so: tests/mutations.sh --list" >&2; exit 2; }
-declare -A passed
 copy_sources
 touch "$work/passed"
+declare -A broken  # by test: what is wrong with it without any fault
+for test in $(for i in "${which[@]}"; do printf '%s ' "${seen_by[i]}"; done | tr ' ' '\n' | sort -u); do
+  ! failed=$(fails_without "$test") || broken[$test]=$failed
+done
 table=() n_caught=0 n_excused=0
 for i in "${which[@]}"; do
   try_fault "$i"
