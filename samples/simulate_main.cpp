@@ -1,8 +1,8 @@
 /// mbtfm-simulate: a synthetic experiment with known truth.
-#include <charconv>
 #include <string_view>
 
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"
 #include "samples/colonies/colony.h"
@@ -32,10 +32,7 @@ void set_scenario(stage::ParameterList& list, drawing::ScenarioParameters& cell,
   stage::read_toml(list, drawing::scenario_file(value_of("--scenario", argc, argv).value_or(cell.scenario)));
   const std::optional<std::string> rough = value_of("--rough", argc, argv);
   if (!rough) return;
-  int number = 0;
-  const auto [end, error] = std::from_chars(rough->data(), rough->data() + rough->size(), number);
-  if (error == std::errc() && end == rough->data() + rough->size() && number > 0)
-    cell = drawing::rough_day(cell, number);
+  if (const int number = parsed<int>(*rough).value_or(0); number > 0) cell = drawing::rough_day(cell, number);
 }
 
 struct SimulateParameters {

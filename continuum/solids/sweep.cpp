@@ -1,11 +1,11 @@
 #include "continuum/solids/sweep.h"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/contract/words.h"
 
 namespace mbtfm::solids {
@@ -26,12 +26,6 @@ std::vector<std::string> parts_of(const std::string& text, char at) {
   return parts;
 }
 
-template <class Number>
-bool reads(const std::string& text, Number& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 [[noreturn]] void refuse(const std::string& name, const std::string& found) {
   throw UsageError(name +
                    ": expected numbers as in 0.1, 0.5, 1 or a range as in 5.3..15.8:11 (from, to, how many), found '" +
@@ -44,18 +38,17 @@ std::vector<double> values_in(const std::string& text, const std::string& name, 
   std::vector<double> values;
   if (const auto dots = text.find(".."); dots != text.npos) {
     const auto colon = text.find(':', dots);
-    double low = 0, high = 0;
-    int n = 0;
-    if (colon == text.npos || !reads(text.substr(0, dots), low) ||
-        !reads(text.substr(dots + 2, colon - dots - 2), high) || !reads(text.substr(colon + 1), n) || !(high > low) ||
-        n < 2 || n > kMostValues)
-      refuse(name, text);
-    for (int k = 0; k < n; ++k) values.push_back(low + (high - low) * k / (n - 1));
+    if (colon == text.npos) refuse(name, text);
+    const auto low = parsed<double>(text.substr(0, dots)),
+               high = parsed<double>(text.substr(dots + 2, colon - dots - 2));
+    const int n = parsed<int>(text.substr(colon + 1)).value_or(0);
+    if (!low || !high || !(*high > *low) || n < 2 || n > kMostValues) refuse(name, text);
+    for (int k = 0; k < n; ++k) values.push_back(*low + (*high - *low) * k / (n - 1));
   } else {
     for (const std::string& part : parts_of(text, ',')) {
-      double value = 0;
-      if (!reads(part, value) || std::ssize(values) == kMostValues) refuse(name, text);
-      values.push_back(value);
+      const auto value = parsed<double>(part);
+      if (!value || std::ssize(values) == kMostValues) refuse(name, text);
+      values.push_back(*value);
     }
   }
   if (values.empty()) refuse(name, text);

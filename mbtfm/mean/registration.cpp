@@ -3,12 +3,12 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <optional>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::mean {
@@ -251,9 +251,8 @@ Symmetry symmetry_of(const std::string& text) {
   Symmetry symmetry;
   const bool has_v = text.ends_with('v');
   const std::string digits = text.substr(std::min<std::size_t>(1, text.size()), text.size() - 1 - (has_v ? 1 : 0));
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), symmetry.n_turns);
-  if (!text.starts_with('C') || error != std::errc() || end != digits.data() + digits.size() || symmetry.n_turns < 1 ||
-      symmetry.n_turns > kMostTurns)
+  symmetry.n_turns = parsed<int>(digits).value_or(0);
+  if (!text.starts_with('C') || symmetry.n_turns < 1 || symmetry.n_turns > kMostTurns)
     throw UsageError(
         "--symmetry: expected C1 (none), C2, C3, ... C24, with v where it has mirrors (C4v), or Cinfv (a circle), "
         "found '" +

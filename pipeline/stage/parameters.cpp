@@ -1,13 +1,13 @@
 #include "pipeline/stage/parameters.h"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <map>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"
@@ -67,49 +67,43 @@ std::string expectation(const Parameter& p) {
       p.member);
 }
 
-template <class T>
-bool read_number(const std::string& text, T& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
 /// Set the member; false where the text is not what it must be.
 bool try_set(Parameter& p, const std::string& text) {
-  return std::visit(Overloaded{[&](auto* number) {
-                                 NumberIn<decltype(*number)> value{};
-                                 const bool is_one = read_number(text, value) && std::isfinite(value);
-                                 if (!is_one || !is_inside(p.range, static_cast<double>(value))) return false;
-                                 *number = value;
-                                 return true;
-                               },
-                               [&](bool* member) {
-                                 *member = text == "true";
-                                 return *member || text == "false";
-                               },
-                               [&](std::string* member) {
-                                 *member = text;
-                                 return true;
-                               },
-                               [&](const Choice& choice) {
-                                 const auto word = std::ranges::find(choice.words, text);
-                                 if (word == choice.words.end()) return false;
-                                 choice.set(static_cast<std::size_t>(word - choice.words.begin()));
-                                 return true;
-                               }},
-                    p.member);
+  return std::visit(
+      Overloaded{[&](auto* number) {
+                   const auto value = parsed<NumberIn<decltype(*number)>>(text);
+                   if (!value || !std::isfinite(*value) || !is_inside(p.range, static_cast<double>(*value)))
+                     return false;
+                   *number = *value;
+                   return true;
+                 },
+                 [&](bool* member) {
+                   *member = text == "true";
+                   return *member || text == "false";
+                 },
+                 [&](std::string* member) {
+                   *member = text;
+                   return true;
+                 },
+                 [&](const Choice& choice) {
+                   const auto word = std::ranges::find(choice.words, text);
+                   if (word == choice.words.end()) return false;
+                   choice.set(static_cast<std::size_t>(word - choice.words.begin()));
+                   return true;
+                 }},
+      p.member);
 }
 
 /// What was probably meant: another unit, or a word of which less than half is misspelt.
 std::string likely_slip(const Parameter& p, const std::string& text) {
   if (const auto* choice = std::get_if<Choice>(&p.member)) return did_you_mean(choice->words, text);
-  double value = 0;
-  if (read_number(text, value)) return unit_slip(p.name, value, p.range);
+  if (const auto value = parsed<double>(text)) return unit_slip(p.name, *value, p.range);
   const std::size_t digits = text.find_first_not_of("0123456789.+-");
-  if (digits != text.npos && digits > 0 && text[digits] != ',' && read_number(text.substr(0, digits), value))
+  if (digits != text.npos && digits > 0 && text[digits] != ',' && parsed<double>(text.substr(0, digits)))
     return "the number alone, without a unit: " + text.substr(0, digits);
   std::string with_point = text;
   std::ranges::replace(with_point, ',', '.');
-  return with_point != text && read_number(with_point, value) ? "decimals follow a point: " + with_point : "";
+  return with_point != text && parsed<double>(with_point) ? "decimals follow a point: " + with_point : "";
 }
 
 std::string advice_on(const Parameter& p, const std::string& text) {

@@ -1,12 +1,12 @@
 #include "segment/beads/table_columns.h"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <set>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/files/names.h"
 
 namespace mbtfm::beads {
@@ -152,11 +152,8 @@ std::vector<std::size_t> matches_in(const Header& header, const Asked& asked, st
     return all(
         [&](const std::string& column) { return std::ranges::find(words, parts_of(column).key) != words.end(); });
   }
-  std::size_t number = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-  if (error == std::errc() && end == name.data() + name.size() && number >= 1 && number <= header.size())
-    return {number - 1};
-  return {};
+  const std::size_t number = parsed<std::size_t>(name).value_or(0);
+  return number >= 1 && number <= header.size() ? std::vector{number - 1} : std::vector<std::size_t>();
 }
 
 /// No names: none at all, or those that a program gives to columns without one.

@@ -1,7 +1,6 @@
 #include "substrate/surface/formula.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -11,6 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/contract/parsed.h"
 
 namespace mbtfm::surface {
 namespace {
@@ -83,9 +83,7 @@ const std::vector<Formula>& formulas() {
 }
 
 double number_in(const std::string& text, const std::string& word) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
+  if (const auto value = parsed<double>(text); value && std::isfinite(*value)) return *value;
   throw UsageError("formula: expected NAME=NUMBER, found '" + word + "'");
 }
 
