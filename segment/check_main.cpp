@@ -10,7 +10,7 @@
 #include "pipeline/runner/cell_stages.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
-#include "pipeline/runner/told.h"
+#include "pipeline/runner/stage_result.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/parameters.h"
 #include "pipeline/stage/stage.h"

@@ -42,11 +42,11 @@ runner::Sink event_sink() {
 
 void show(const std::string& line) { std::fprintf(stderr, "\r\033[K%s", line.c_str()); }
 
-std::function<void(const runner::StageTold&)> teller(const CommandLine& line) {
-  if (line.is_json) return [](const runner::StageTold& told) { stage::print(events_of(told)); };
+std::function<void(const runner::StageResult&)> teller(const CommandLine& line) {
+  if (line.is_json) return [](const runner::StageResult& result) { stage::print(events_of(result)); };
   if (line.run.is_quiet) return nullptr;
   const auto detail = line.is_verbose ? runner::Detail::all : runner::Detail::brief;
-  return [detail](const runner::StageTold& told) { say(text_of(told, detail)); };
+  return [detail](const runner::StageResult& result) { say(text_of(result, detail)); };
 }
 
 runner::RunOptions run_options(const CommandLine& line) {
@@ -207,8 +207,8 @@ int batch(const CommandLine& line) {
                         .show = line.run.is_quiet || !is_terminal() ? nullptr : show});
   const auto n_failed = std::ranges::count_if(outcomes, [](const auto& cell) { return cell.exit_code != 0; });
   if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
-  const runner::BatchCounts told = runner::write_batch_tables(line.folder, outcomes, skipped, line.run.only);
-  say(told.counts + "; " + (line.folder / "batch.csv").string() + told.not_to_count);
+  const runner::BatchCounts written = runner::write_batch_tables(line.folder, outcomes, skipped, line.run.only);
+  say(written.counts + "; " + (line.folder / "batch.csv").string() + written.not_to_count);
   return n_failed == 0 ? kDone : kFailed;
 }
 

@@ -174,7 +174,9 @@ namespace {
 const std::string kWithin = "within a metre";
 
 bool is_within(double place_um) { return is_inside(possible_place_um(), place_um); }  // NaN is not
-std::string told(double place_um) { return std::isfinite(place_um) ? brief(place_um) + " um" : "NaN or infinity"; }
+std::string place_or_none(double place_um) {
+  return std::isfinite(place_um) ? brief(place_um) + " um" : "NaN or infinity";
+}
 
 }  // namespace
 
@@ -187,7 +189,7 @@ void check(const HeightMap& map) {
   require(map.sigma_um.empty() || map.sigma_um.size() == n, "height map", lattice,
           std::to_string(map.sigma_um.size()) + " standard errors");
   require(is_within(map.origin_um.x) && is_within(map.origin_um.y), "height map", "an origin " + kWithin,
-          told(map.origin_um.x) + ", " + told(map.origin_um.y));
+          place_or_none(map.origin_um.x) + ", " + place_or_none(map.origin_um.y));
   require(map.spacing_um.x > 0 && map.spacing_um.y > 0 && is_within(map.n_x * map.spacing_um.x) &&
               is_within(map.n_y * map.spacing_um.y),
           "height map", "positive spacings of a lattice " + kWithin,
@@ -196,7 +198,7 @@ void check(const HeightMap& map) {
     const bool has_sigma = map.sigma_um.empty() || (map.sigma_um[k] >= 0 && is_within(map.sigma_um[k]));
     if (is_within(map.z_um[k]) && has_sigma) continue;
     const std::string vertex = "height map, vertex " + std::to_string(k);
-    require(is_within(map.z_um[k]), vertex, "a height " + kWithin, told(map.z_um[k]));
+    require(is_within(map.z_um[k]), vertex, "a height " + kWithin, place_or_none(map.z_um[k]));
     require(false, vertex, "a standard error of at least 0", brief(map.sigma_um[k]));
   }
 }
@@ -206,7 +208,7 @@ void check(const TriangleMesh& mesh) {
     const Vec3 p = mesh.points_um[k];
     for (const double place : {p.x, p.y, p.z})
       if (!is_within(place))
-        throw InvalidData("mesh, point " + std::to_string(k), "coordinates " + kWithin, told(place));
+        throw InvalidData("mesh, point " + std::to_string(k), "coordinates " + kWithin, place_or_none(place));
   }
   const auto n = static_cast<int>(mesh.points_um.size());
   for (std::size_t k = 0; k < mesh.triangles.size(); ++k)

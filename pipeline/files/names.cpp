@@ -11,9 +11,9 @@ namespace mbtfm::files {
 
 namespace {
 
-std::string bytes_told_by(std::string_view text) {
+std::string bytes_of_shown(std::string_view text) {
   constexpr std::size_t kEscape = 4;       // \xE9
-  constexpr unsigned kBeyondAscii = 0x80;  // no other byte is told so: none makes a name of "..", say
+  constexpr unsigned kBeyondAscii = 0x80;  // no other byte is shown so: none makes a name of "..", say
   std::string bytes;
   for (std::size_t i = 0; i < text.size(); ++i) {
     unsigned byte = 0;
@@ -151,7 +151,7 @@ std::filesystem::path file_shown_as(const std::filesystem::path& folder, const s
   const std::string wanted = composed(same.filename().string());
   for (const std::filesystem::path& file : visible_in(same.parent_path()))
     if (composed(file.filename().string()) == wanted) return file;
-  return folder / bytes_told_by(name);
+  return folder / bytes_of_shown(name);
 }
 
 }  // namespace mbtfm::files

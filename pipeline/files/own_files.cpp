@@ -79,9 +79,9 @@ void expect_no_hole(const fs::path& file) {
   throw InputError(file.string(), "a file of data", "a hole of " + std::to_string(size) + " bytes", "remove it");
 }
 
-fs::path inside(const fs::path& folder, const fs::path& name, const std::string& told_by) {
+fs::path inside(const fs::path& folder, const fs::path& name, const std::string& named_by) {
   const auto refuse = [&](const std::string& found) {
-    throw InputError(told_by, "names of files inside of " + folder.string(), found,
+    throw InputError(named_by, "names of files inside of " + folder.string(), found,
                      "remove the file if it is not yours");
   };
   const std::string text = name.string();

@@ -29,9 +29,9 @@ void expect_no_hole(const fs::path& file);
 
 /// Where `name` lies, which a file of the folder tells: below the folder, and on no way through a link. The folder
 /// itself may be reached through links.
-/// @param told_by  for the message: the file that has the name, or the folder
+/// @param named_by  for the message: the file that has the name, or the folder
 /// @throws InputError where the name is empty, absolute, leads through `..` or a link, or is no name
-fs::path inside(const fs::path& folder, const fs::path& name, const std::string& told_by);
+fs::path inside(const fs::path& folder, const fs::path& name, const std::string& named_by);
 
 /// The folders of a cell that hold what the stages write, and the truth of a simulated one, are folders, and all in
 /// them is files and folders: no links, pipes, sockets, devices. Called wherever a cell folder is opened. @throws

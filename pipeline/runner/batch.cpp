@@ -196,7 +196,7 @@ BatchCell run_when_free(const fs::path& cell, const BatchOptions& options) {
 }
 
 /// Once for all cells of the same parameters, which are most as a rule: do the stages accept them? Starting a stage to
-/// ask costs up to half a second, and a wrong parameter should be told before an hour's work, not after it.
+/// ask costs up to half a second, and a wrong parameter should be named before an hour's work, not after it.
 /// The outcomes of cells that are refused say so.
 void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options) {
   std::map<std::pair<std::string, std::string>, std::vector<Look*>> cells_by_settings;

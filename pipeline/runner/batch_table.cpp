@@ -36,7 +36,7 @@ std::string text_of(const Value& value) {
 }
 
 /// Those of the cell as it is now; where that cannot be read, of both kinds: records of either may be there.
-CellStages stages_told_of(const fs::path& cell) {
+CellStages stages_or_all(const fs::path& cell) {
   try {
     return stages_of(cell, read_image_names(cell));
   } catch (const InputError&) {
@@ -166,7 +166,7 @@ BatchRow row_of(const BatchCell& cell, const fs::path& folder, const std::vector
   if (cell.cell == folder) row.name = fs::weakly_canonical(cell.cell).filename().string();
   row.state = cell.is_left_undone ? CellState::not_run : CellState::failed;
   if (cell.exit_code != 0) return row;  // what it has on disk may be of an earlier run
-  const CellStages of = stages_told_of(cell.cell);
+  const CellStages of = stages_or_all(cell.cell);
   row.kind = of.kind;
   for (const Stage& stage : of.stages) {
     if (!is_asked(stage, only)) continue;
@@ -249,7 +249,7 @@ std::string not_to_count(const std::vector<BatchRow>& rows) {
 
 std::string last_summary(const fs::path& cell, const std::vector<std::string>& only) {
   std::string summary;
-  for (const Stage& stage : stages_told_of(cell).stages) {
+  for (const Stage& stage : stages_or_all(cell).stages) {
     if (!is_asked(stage, only)) continue;
     const auto record = report_of(cell, stage);
     if (record && !record->summary.empty()) summary = record->summary;

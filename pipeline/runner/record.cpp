@@ -79,10 +79,10 @@ std::vector<std::string> frames_read(const fs::path& cell, const std::string& li
 
 fs::path record_file_of(const fs::path& cell, const Stage& stage) { return cell / stage.folder / "record.json"; }
 
-fs::path output_file(const fs::path& cell, const Stage& stage, const fs::path& name, const std::string& told_by) {
-  const fs::path file = files::inside(cell, name, told_by);
+fs::path output_file(const fs::path& cell, const Stage& stage, const fs::path& name, const std::string& named_by) {
+  const fs::path file = files::inside(cell, name, named_by);
   if (!name.empty() && *name.begin() == stage.folder) return file;
-  throw InputError(told_by, "outputs of " + stage.name + " in " + stage.folder, "'" + name.string() + "'",
+  throw InputError(named_by, "outputs of " + stage.name + " in " + stage.folder, "'" + name.string() + "'",
                    "remove the file if it is not yours");
 }
 

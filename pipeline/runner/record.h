@@ -28,10 +28,10 @@ struct StageRecord {
 std::filesystem::path record_file_of(const std::filesystem::path& cell, const Stage& stage);
 
 /// Where an output lies that a record names, relative to the cell folder. Outputs are hashed, copied and deleted by
-/// what records say. @param told_by  the record @throws InputError where it does not lie inside of the stage's own
+/// what records say. @param named_by  the record @throws InputError where it does not lie inside of the stage's own
 /// folder
 std::filesystem::path output_file(const std::filesystem::path& cell, const Stage& stage,
-                                  const std::filesystem::path& name, const std::string& told_by);
+                                  const std::filesystem::path& name, const std::string& named_by);
 
 /// Empty where there is none. @throws InputError where it is malformed, or names outputs outside of the stage's folder
 std::optional<StageRecord> read_record(const std::filesystem::path& cell, const Stage& stage);

@@ -195,10 +195,10 @@ class CellRun {
     }
   }
 
-  void say(const StageTold& told) {
+  void say(const StageResult& result) {
     if (!options_.say) return;
     const std::lock_guard guard(saying_);
-    options_.say(told);
+    options_.say(result);
   }
 
   void bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {

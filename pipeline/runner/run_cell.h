@@ -8,7 +8,7 @@
 #include "pipeline/contract/path.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/record.h"
-#include "pipeline/runner/told.h"
+#include "pipeline/runner/stage_result.h"
 
 namespace mbtfm::runner {
 
@@ -26,7 +26,7 @@ struct RunOptions {
   std::vector<Setting> beneath_in_space = {};  ///< the same of a cell in space
   std::vector<Setting> set = {};               ///< in place of what cell.toml says
   std::string version;
-  std::function<void(const StageTold&)> say;          ///< what became of each stage
+  std::function<void(const StageResult&)> say;        ///< what became of each stage
   std::function<Sink()> sink = {};                    ///< makes one for what a stage prints; empty: our standard error
   std::function<void(const std::string&)> note = {};  ///< takes why the cell has the stages that it has
   std::function<void()> finish;                       ///< called when the stages are done, the cell still being ours

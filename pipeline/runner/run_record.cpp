@@ -30,7 +30,7 @@ std::optional<files::JsonRecord> open_run_record(const fs::path& cell) {
   return files::JsonRecord(file, "a run.json of mbtfm run", "delete it: the next run writes another");
 }
 
-/// What an earlier run told of a stage; none where it told nothing.
+/// What an earlier run recorded of a stage; none if it recorded nothing.
 std::optional<files::JsonRecord> entry_of(const std::optional<files::JsonRecord>& run, const std::string& stage) {
   const auto entries = run ? run->find("stages") : std::nullopt;
   const auto entry = entries ? entries->find(stage) : std::nullopt;
@@ -66,9 +66,9 @@ StageOutcome completed(StageOutcome outcome, const Stage& stage, const fs::path&
   return outcome;
 }
 
-ordered_json stage_entry(const Stage& stage, const StageOutcome& told, const fs::path& cell,
+ordered_json stage_entry(const Stage& stage, const StageOutcome& recorded, const fs::path& cell,
                          const std::optional<files::JsonRecord>& before) {
-  const StageOutcome outcome = completed(told, stage, cell);
+  const StageOutcome outcome = completed(recorded, stage, cell);
   ordered_json entry;
   entry["state"] = state_of(outcome);
   entry["why"] = outcome.status.why;

@@ -17,7 +17,7 @@ enum class RunOutcome { done, failed, unfinished };
 constexpr auto words(RunOutcome) { return std::array{"done", "failed", "unfinished"}; }
 
 /// Merge the records of all stages, and what became of them in this run, to run.json. Of stages that this run was not
-/// asked for, it keeps what an earlier one told.
+/// asked for, it keeps what an earlier one recorded.
 /// @throws OutputError
 void write_run_record(const fs::path& cell, const RunOptions& options, const CellOutcome& outcome);
 

@@ -9,8 +9,8 @@
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/stage_result.h"
 #include "pipeline/runner/stages.h"
-#include "pipeline/runner/told.h"
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/effects.h"
 #include "tests/support/folders.h"
@@ -580,11 +580,11 @@ TEST(Batch, a_folder_without_cells_is_an_error) {
 }
 
 TEST(Told, is_one_line_for_the_stage_and_names_effects_that_are_on_unasked) {
-  StageTold told{.stage = "fit",
-                 .status = {StageState::must_run, "not run yet"},
-                 .was_run = true,
-                 .seconds = 2.34,
-                 .report = StageReport{}};
+  StageResult told{.stage = "fit",
+                   .status = {StageState::must_run, "not run yet"},
+                   .was_run = true,
+                   .seconds = 2.34,
+                   .report = StageReport{}};
   told.report->summary = "20 tensions";
   const auto effect = [](EffectKind kind, Switch setting, bool is_on) {
     return Effect{.kind = kind, .setting = setting, .is_on = is_on, .why = "because"};
@@ -601,7 +601,7 @@ TEST(Told, is_one_line_for_the_stage_and_names_effects_that_are_on_unasked) {
 }
 
 TEST(Told, events_are_json_objects_a_line) {
-  StageTold told{
+  StageResult told{
       .stage = "track", .status = {StageState::must_run, "not run yet"}, .was_run = true, .report = StageReport{}};
   told.report->summary = "two\nlines and \"quotes\"";
   told.report->findings = {{.id = "nothing-moves", .severity = Severity::caution, .text = "Nothing moves."}};

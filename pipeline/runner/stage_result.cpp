@@ -1,4 +1,4 @@
-#include "pipeline/runner/told.h"
+#include "pipeline/runner/stage_result.h"
 
 #include <iomanip>
 #include <nlohmann/json.hpp>
@@ -17,12 +17,12 @@ namespace {
 
 constexpr const char* kFirstTime = "not run yet";  // as status_of says: no news
 
-std::string result_of(const StageTold& told) {
-  if (!told.was_run) return name_of(told.status.state) + (": " + told.status.why);
+std::string outcome_of(const StageResult& result) {
+  if (!result.was_run) return name_of(result.status.state) + (": " + result.status.why);
   std::ostringstream text;
-  if (!told.converged) text << "NOT CONVERGED: ";
-  if (told.report) text << told.report->summary << ' ';
-  text << '(' << std::fixed << std::setprecision(1) << told.seconds << " s";
+  if (!result.converged) text << "NOT CONVERGED: ";
+  if (result.report) text << result.report->summary << ' ';
+  text << '(' << std::fixed << std::setprecision(1) << result.seconds << " s";
   return text.str();
 }
 
@@ -38,40 +38,40 @@ std::string line(const ordered_json& event) { return files::json_text(event) + "
 
 }  // namespace
 
-std::string text_of(const StageTold& told, Detail detail) {
+std::string text_of(const StageResult& result, Detail detail) {
   std::ostringstream text;
-  text << std::left << std::setw(9) << told.stage << result_of(told);
-  if (told.was_run) {
-    if (detail == Detail::all) text << std::fixed << std::setprecision(0) << ", " << told.peak_memory_MB << " MB";
-    if (detail == Detail::all || told.status.why != kFirstTime) text << "; " << told.status.why;
+  text << std::left << std::setw(9) << result.stage << outcome_of(result);
+  if (result.was_run) {
+    if (detail == Detail::all) text << std::fixed << std::setprecision(0) << ", " << result.peak_memory_MB << " MB";
+    if (detail == Detail::all || result.status.why != kFirstTime) text << "; " << result.status.why;
     text << ')';
   }
-  if (!told.report) return text.str();
-  for (const Finding& finding : told.report->findings) {
+  if (!result.report) return text.str();
+  for (const Finding& finding : result.report->findings) {
     const std::string line = "\n  " + line_of(finding);
     text << (is_open(finding) ? stage::warning(line) : line);
   }
   if (detail == Detail::all)
-    for (const Effect& effect : told.report->effects) text << "\n  " << stage::line_of(effect);
-  else if (const std::string names = effects_on(told.report->effects); !names.empty())
+    for (const Effect& effect : result.report->effects) text << "\n  " << stage::line_of(effect);
+  else if (const std::string names = effects_on(result.report->effects); !names.empty())
     text << "\n  on as your data call for it: " << names;
   return text.str();
 }
 
-std::string events_of(const StageTold& told) {
+std::string events_of(const StageResult& result) {
   ordered_json event = {{"event", "stage"},
-                        {"stage", told.stage},
-                        {"state", name_of(told.status.state)},
-                        {"why", told.status.why},
-                        {"converged", told.converged}};
-  if (told.was_run) {
-    event["seconds"] = told.seconds;
-    event["peak_memory_MB"] = told.peak_memory_MB;
+                        {"stage", result.stage},
+                        {"state", name_of(result.status.state)},
+                        {"why", result.status.why},
+                        {"converged", result.converged}};
+  if (result.was_run) {
+    event["seconds"] = result.seconds;
+    event["peak_memory_MB"] = result.peak_memory_MB;
   }
-  if (!told.report) return line(event);
-  event["summary"] = told.report->summary;
-  event["figures"] = files::json_of(told.report->figures);
-  return line(event) + files::events_of(told.stage, *told.report);
+  if (!result.report) return line(event);
+  event["summary"] = result.report->summary;
+  event["figures"] = files::json_of(result.report->figures);
+  return line(event) + files::events_of(result.stage, *result.report);
 }
 
 std::string event_of_look(const ImageLook& look) {

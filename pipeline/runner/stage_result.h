@@ -9,7 +9,7 @@
 
 namespace mbtfm::runner {
 
-struct StageTold {
+struct StageResult {
   std::string stage;
   StageStatus status;  ///< before the run
   bool was_run = false;
@@ -24,10 +24,10 @@ enum class Detail {
 };
 
 /// One line for the stage; below it, indented, its findings and effects.
-std::string text_of(const StageTold& told, Detail detail);
+std::string text_of(const StageResult& result, Detail detail);
 
 /// JSON objects, one a line: the stage, its findings, its effects (docs/formats/json.md, "Events").
-std::string events_of(const StageTold& told);
+std::string events_of(const StageResult& result);
 /// What a first look at a cell's images found, as `mbtfm check --json` prints it.
 struct ImageLook {
   std::string cell, facts;
