@@ -163,6 +163,7 @@ TEST_F(Errors, hints_of_a_stage_name_keys_under_a_run_and_flags_alone) {
                         "give it as --adhesion-mask"));
   EXPECT_TRUE(
       has_words(output_of("mbtfm run --set segment.cell=-3 " + cell_.string(), kUsage), "cell in [segment]: expected"));
+  EXPECT_TRUE(has_words(output_of("mbtfm run --set segment.cell=0 " + cell_.string(), kUsage), "write cell = 0 below"));
 }
 
 TEST_F(Errors, an_adhesion_outside_the_outline_is_named) {
