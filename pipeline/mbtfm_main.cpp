@@ -65,7 +65,7 @@ int start(int argc, char** argv) {
   line.run.threads = numerics::available_threads();
   CLI::App app("", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
-  app.footer("Exit codes: " + stage::exit_codes());
+  app.footer("Exit codes: " + stage::help_on("exit status", ""));
   app.require_subcommand(0, 1);
   declare(app, line);
   fs::path manuals;

@@ -11,6 +11,7 @@
 namespace mbtfm {
 
 extern const std::vector<std::pair<const char*, const char*>> kFormerIds;  // findings.txt: of now; before, with commas
+extern const std::string_view kFindingsPage;                               // findings.md
 
 namespace {
 
@@ -91,27 +92,17 @@ std::string open_ids(const std::vector<Finding>& findings) {
 }
 
 std::string findings_page() {
-  std::string page =
-                  "# Findings\n\nWhat the program notices about images, beads and its own answer is a finding. A "
-                  "**note** is worth "
-                  "knowing; the\nresults hold. After a **caution** results may be off by more than their error bars "
-                  "say. Do not use "
-                  "what a **bad**\nfinding names. The report shows a green tick only if no caution and no bad finding "
-                  "is open.\n\n"
-                  "*How often false*: how many sound simulated cells had it open; of the fit with a right "
-                  "segmentation. Empty: not "
-                  "measured.\n\n| finding | in plain words | what to do | how often false |\n|---|---|---|---|\n",
-              numbers =
-                  "\n## Numbers and thresholds\n\nFor developers: a finding opens if a number is above its threshold."
-                  "\n\n| finding | stage | severity | number | threshold | why |\n|---|---|---|---|---|---|\n";
+  std::string page(kFindingsPage), kinds, numbers;
   for (const KindOfFinding& kind : kinds_of_findings()) {
     const std::string id = "| `" + std::string(kind.id) + "` | ";
-    page += id + kind.meaning + " | " + kind.remedy + " | " + kind.false_alarms + " |\n";
+    kinds += id + kind.meaning + " | " + kind.remedy + " | " + kind.false_alarms + " |\n";
     for (const KnownSymptom& s : kind.symptoms)
       numbers += id + s.stage + " | " + name_of(s.severity) + " | " + s.number + " | " + brief(s.threshold) + " | " +
                  s.reason + " |\n";
   }
-  return page + numbers;
+  replace(page, "{kinds}\n", kinds);
+  replace(page, "{numbers}\n", numbers);
+  return page;
 }
 
 }  // namespace mbtfm

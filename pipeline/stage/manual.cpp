@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/version.h"
 #include "pipeline/files/text.h"
+#include "pipeline/stage/help.h"
 
 namespace mbtfm::stage {
 
@@ -99,12 +100,6 @@ std::string options(const DeclaredCommand& command, Groups groups) {
 
 }  // namespace
 
-std::string exit_codes() {
-  return "0 done, 1 some cells failed, 2 wrong flag, 3 bad input, 4 not converged (outputs are there, marked), 5 "
-         "cannot write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, 130 "
-         "interrupted, 128 + n killed by signal n.";
-}
-
 std::string manual_page(const CLI::App& app) {
   const DeclaredCommand program = declared(app);
   std::string page = ".TH " + troff(upper(program.name)) + " 1 \"\" \"mbtfm " + troff(kVersion) +
@@ -115,7 +110,7 @@ std::string manual_page(const CLI::App& app) {
     page += ".SS " + troff(command.name) + "\n" + synopsis(program.name + " " + command.name, command) + ".PP\n" +
             troff(command.meaning) + ".\n" + options(command, Groups::are_one);
   }
-  page += ".SH EXIT STATUS\n" + troff(exit_codes()) + "\n.SH SEE ALSO\n";
+  page += ".SH EXIT STATUS\n" + troff(help_on("exit status", "")) + "\n.SH SEE ALSO\n";
   page += !program.subcommands.empty()
               ? "The stages that it starts: mbtfm\\-segment(1), mbtfm\\-track(1), mbtfm\\-network(1), mbtfm\\-fit(1).\n"
               : "mbtfm(1)\n";

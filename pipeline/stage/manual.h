@@ -31,9 +31,6 @@ struct DeclaredCommand {
 /// Without what is hidden from --help.
 DeclaredCommand declared(const CLI::App& app);
 
-/// How a program ends, as one sentence.
-std::string exit_codes();
-
 /// The words that an option takes, by its flag ("--model").
 using WordsOfFlags = std::map<std::string, std::vector<std::string>>;
 

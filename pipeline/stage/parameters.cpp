@@ -30,14 +30,6 @@ constexpr std::array kKeysOfGel = {"youngs_modulus_kPa", "shear_modulus_kPa", "p
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
-/// Keys up to version 0.2 that are constants now, as nobody set them; a space before and after each.
-constexpr std::string_view kDeletedKeys =
-    " seeds free_fibre_ends edge_growth adhesion_level_radius_um adhesion_blur_um fibre_edge_height fibre_side_ratio "
-    "fibre_simplify_um fibre_false_per_cell outline_smoothing_um outline_band_um outline_spacing_um "
-    "free_edge_concavity adhesion_area_log_sd peripheral_fraction peripheral_band_um n_carpets merging_fraction "
-    "nucleus_radius_um simulation_substrate element elements_per_adhesion shift_error_um size_error angle_error_deg "
-    "lambda_for margin_um band_um ";
-
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
@@ -142,7 +134,7 @@ std::string spelled(const toml::node& node, const std::string& where) {
 
 /// @param list  of the stage, whose keys of other tables may be meant
 std::string unknown_key_hint(const ParameterList& list, const std::vector<std::string>& known, const std::string& key) {
-  if (kDeletedKeys.find(" " + key + " ") != kDeletedKeys.npos)
+  if ((" " + help_on("deleted keys", "") + " ").find(" " + key + " ") != std::string::npos)
     return "this version computes as its default did and has no such key: take the line out (CHANGELOG.md)";
   if (const std::string meant = did_you_mean(known, key); !meant.empty()) return meant;
   if (std::ranges::find(kKeysOfGel, key) != kKeysOfGel.end()) return "it belongs under [gel]";

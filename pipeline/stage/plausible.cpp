@@ -60,11 +60,19 @@ std::string range_text(const Range& range) { return describe("", range); }
 
 }  // namespace
 
-const std::vector<PlausibleQuantity>& plausible_quantities() {
+namespace {
+
+const toml::table& plausible_file() {
   static const toml::table file = files::parse_toml(kPlausible, "plausible.toml");
+  return file;
+}
+
+}  // namespace
+
+const std::vector<PlausibleQuantity>& plausible_quantities() {
   static const std::vector<PlausibleQuantity> table = [] {
     std::vector<PlausibleQuantity> all;
-    for (const toml::node& node : *file["quantity"].as_array()) {
+    for (const toml::node& node : *plausible_file()["quantity"].as_array()) {
       const toml::table& of = *node.as_table();
       const auto text = [&](const char* key) { return of[key].as_string()->get().c_str(); };
       const auto range = [&](const char* key) {
@@ -104,10 +112,11 @@ bool is_of_table(const Doubt& d) {
 
 std::string sentence_of(const Doubt& d) {
   if (!is_of_table(d))
-    return "the " + d.quantity + " is " + with_unit(d.id, d.value) + ", but " + with_unit(d.id, d.limit) +
+    return "the " + d.quantity + " is " + with_unit(d.id, brief(d.value)) + ", but " + with_unit(d.id, brief(d.limit)) +
            " by the image's own calibration: both cannot be right";
-  return "the " + d.quantity + " is " + with_unit(d.id, d.value) + (d.value > d.limit ? ", above " : ", below ") +
-         brief(d.limit) + (d.level == DoubtLevel::refused ? ": it cannot be" : ": unusual");
+  return "the " + d.quantity + " is " + with_unit(d.id, brief(d.value)) +
+         (d.value > d.limit ? ", above " : ", below ") + brief(d.limit) +
+         (d.level == DoubtLevel::refused ? ": it cannot be" : ": unusual");
 }
 
 void require_possible(const Doubt& d, const std::vector<std::string>& allowed, const std::string& where) {
@@ -237,13 +246,7 @@ std::string sentence_of(const AssumedInput& input) {
 }
 
 std::string plausible_page() {
-  std::string page =
-      "# Plausible values\n\nThe programs check their inputs and their results against this table, which they write "
-      "themselves. Outside the usual\nrange a value is a caution. Outside the possible range it is an error, unless "
-      "`cell.toml` allows it:\n\n```toml\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n```\n\n"
-      "`pixel_size_um` is also compared with each image's own calibration: a difference above 1 % is a caution, above "
-      "20 % an error.\nIf `thickness_um`, `poisson_ratio` or the errors of the displacements are not given, they are "
-      "listed as assumed.\n\n| quantity | usual | possible | source | what to do |\n|---|---|---|---|---|\n";
+  std::string page = plausible_file()["page"].as_string()->get();
   for (const PlausibleQuantity& q : plausible_quantities()) {
     page += "| `" + std::string(q.id) + "`: " + q.quantity + " |" + range_text(q.usual) + " |" +
             range_text(q.possible) + " | " + q.source + " | " + q.remedy + " |\n";

@@ -14,6 +14,8 @@
 
 namespace mbtfm::stage {
 
+extern const std::string_view kElsewhere;  // elsewhere.txt
+
 namespace {
 
 /// Letters that are changed, left out, added or exchanged with the next one; capitals are as good as small ones.
@@ -80,48 +82,6 @@ int n_common_parts(std::string_view a, std::string_view b) {
   return static_cast<int>(std::ranges::count_if(of_a, [&](const auto& part) { return of_b.contains(part); }));
 }
 
-/// What other programs call it, and what it is here: a flag, command or key where there is such a one, or a sentence.
-struct Elsewhere {
-  std::string_view theirs;  ///< words with blanks between them, without dashes
-  std::string_view ours;
-};
-constexpr Elsewhere kElsewhere[] = {
-    {"force overwrite", "redo"},
-    {"o output outdir", "out"},
-    {"o output outdir", "the results go into the cell's own folder"},
-    {"j workers parallel", "jobs"},
-    {"j n t workers cores cpus parallel jobs", "threads"},
-    {"until to from skip stage stages step start", "only"},
-    {"resume continue restart", "a run goes on by itself where the last one stopped"},
-    {"exclude ignore without", "name it in the study's table, with its reason in the column 'exclude'"},
-    {"by group groups group_by groupby condition", "condition_from"},
-    {"config cfg", "cell.toml is read from the folder that is given"},
-    {"v vv debug", "verbose"},
-    {"v", "version"},
-    {"? man usage", "help"},
-    {"q silent", "quiet"},
-    {"density", "beads_per_um2"},
-    {"density", "beads_per_um3"},
-    {"seed scenario", "mbtfm-simulate makes other cells: mbtfm-simulate --help"},
-    {"start go execute analyse analyze analysis process", "run"},
-    {"all folder runall run-all", "batch"},
-    {"statistics stat summary summarize", "stats"},
-    {"new create setup", "init"},
-    {"report show view results plot", "mbtfm run writes report.html into the cell's folder: open it in a browser"},
-    {"review", "mbtfm stats writes review.html, all overlays on one page"},
-    {"e stiffness elasticity young", "youngs_modulus_kPa"},
-    {"g", "shear_modulus_kPa"},
-    {"nu", "poisson_ratio"},
-    {"scale pixel px um_per_px um_per_pixel", "pixel_size_um"},
-    {"paxillin vinculin zyxin talin focal_adhesions fa", "adhesion"},
-    {"adhesion_size adhesion_area min_area", "adhesion_smallest_um2"},
-    {"phalloidin lifeact f_actin", "actin"},
-    {"reference relaxed unloaded trypsin before", "beads_relaxed"},
-    {"reference unloaded trypsin before", "relaxed"},
-    {"stressed loaded deformed after", "beads_stressed"},
-    {"loaded deformed after", "stressed"},
-};
-
 std::string quoted(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words)
@@ -132,9 +92,12 @@ std::string quoted(const std::vector<std::string>& words) {
 enum class Ours { words, words_and_sentences };  // sentences are of flags and commands
 
 std::string named_elsewhere(const std::vector<std::string>& known, std::string_view word, Ours as) {
-  for (const auto& [theirs, ours] : kElsewhere) {
-    if ((" " + std::string(theirs) + " ").find(" " + lower(word) + " ") == std::string::npos) continue;
-    if (ours.find(' ') != ours.npos && as == Ours::words_and_sentences) return std::string(ours);
+  std::istringstream lines{std::string(kElsewhere)};
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t end = line.find(": ");
+    if (line.starts_with('#') || (" " + line.substr(0, end) + " ").find(" " + lower(word) + " ") == line.npos) continue;
+    const std::string ours = line.substr(end + 2);
+    if (ours.find(' ') != ours.npos && as == Ours::words_and_sentences) return ours;
     const auto same = std::ranges::find_if(known, [&](const auto& k) { return lower(k) == lower(ours); });
     if (same != known.end()) return "did you mean " + quoted({*same}) + "?";
   }

@@ -12,12 +12,14 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/table_text.h"
 #include "pipeline/report/page.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/statistics/review.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
 
 extern const std::string_view kReviewScript;  // review.js
+extern const std::string_view kReviewStyle;   // review.css
 
 namespace {
 
@@ -84,18 +86,6 @@ std::string article_of(const Study& study, const std::string& name, const Review
          "'</code> <button type=\"button\" class=\"copy\">copy</button></p>\n</div></div>\n</article>\n";
 }
 
-constexpr const char* kStyle =
-    "<style>.look{display:flex;flex-wrap:wrap;gap:16px}.look img{max-width:100%;max-height:80vh;background:#000}"
-    ".look>a{flex:1 1 420px}.look>div{flex:1 1 "
-    "360px}button[aria-pressed=true]{background:#0b5cad;color:#fff}</style>\n";
-
-constexpr const char* kHowTo =
-    "<p class=\"screen\"><button type=\"button\" id=\"previous\">previous (p)</button> <button type=\"button\" "
-    "id=\"next\">next (n)</button> <span id=\"where\"></span> <button type=\"button\" id=\"save\">Save "
-    "review.csv</button></p>\n<p class=\"sub\">Keys: a accept, x leave out, n and p (or arrows) next and previous. "
-    "Your browser keeps what you decide. Put the saved <code>review.csv</code> into the study’s folder: <code>mbtfm "
-    "stats</code>, Python and R obey it.</p>\n";
-
 }  // namespace
 
 std::vector<Review> reviews_of(const Path& study, const std::vector<std::string>& names,
@@ -147,11 +137,11 @@ void take_review(const Review& review, StudyCell& cell, std::vector<std::string>
 
 std::string review_html(const Study& study, const Path& page_folder) {
   const std::string up = study.folder.lexically_proximate(page_folder).generic_string() + "/";
-  std::string body = kStyle;
+  std::string body = "<style>\n" + std::string(kReviewStyle) + "</style>\n";
   const Path file = study.folder / kReview;
   body += fmt::format("<div data-study=\"{} {}\"></div>\n", html_escaped(fs::weakly_canonical(study.folder).string()),
                       files::is_own_file(file) ? files::sha256_of_file(file) : "");
-  body += kHowTo;
+  body += report::text_of("study.review-buttons") + "\n" + report::note("study.review");
   for (const StudyCell& cell : study.cells) {
     const auto n_open = std::ranges::count_if(cell.findings, is_open);
     body += article_of(study, cell.name, cell.review,

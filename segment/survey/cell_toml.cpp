@@ -5,6 +5,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/stage/help.h"
 #include "segment/images/image.h"
 #include "segment/stacks/track.h"
 #include "segment/survey/roles.h"
@@ -46,24 +47,23 @@ std::string quoted(const std::string& name) {
   return text + "\"";
 }
 
+/// A line of the file, as help.txt has it.
+std::string line_of(const std::string& key, const std::vector<std::string>& values = {}) {
+  return stage::help_on("lines of cell.toml", key, values) + "\n";
+}
+
 /// The table [track] of stacks, and what is to be completed in it.
 std::string track_table(const Says& beads, std::vector<std::string>& open) {
-  std::string text = "\n[track]\n# The bead images are stacks of " + std::to_string(beads.n_slices) +
-                     " slices. Their beads are followed in space as soon as z_points is given.\n"
-                     "# z_points = \"into-gel\"    # needed: the first slice is the highest; \"out-of-gel\": the first "
-                     "is the deepest\n";
+  std::string text = "\n[track]\n" + line_of("stacks", {std::to_string(beads.n_slices)}) + line_of("z_points");
   open.emplace_back("z_points in [track]");
   if (beads.z_step_um) {
-    text += "# The files say that the slices are " + shortest(*beads.z_step_um) + " um apart. To overrule it:\n" +
-            "# z_step_um = " + shortest(*beads.z_step_um) + "\n";
+    const std::string step_um = shortest(*beads.z_step_um);
+    text += line_of("z-step-known", {step_um}) + "# z_step_um = " + step_um + "\n";
   } else {
-    text += "# z_step_um = 0.5    # needed, as no file says it: how far the stage moved between two slices (um)\n";
+    text += line_of("z-step-missing");
     open.emplace_back("z_step_um in [track]");
   }
-  return text +
-         "# first_slice_z_um = 0    # z of the upper face of the highest slice; z = 0 is where gel.thickness_um counts "
-         "from\n# dimensions = \"plane\"    # instead of all this: follow beads in the maximum projection, on a flat "
-         "gel\n";
+  return text + line_of("first-slice") + line_of("plane");
 }
 
 }  // namespace
@@ -81,7 +81,7 @@ Written cell_toml(const std::filesystem::path& folder) {
     if (file == roles.files.end()) {
       const bool is_needed = key != std::string("surface_beads") && (!stacks || std::string(key).starts_with("beads_"));
       if (!is_needed) continue;  // a cell in space may have no other images
-      images += "# " + std::string(key) + " = \"\"    # which file? no name shows it\n";
+      images += line_of("no-file", {key});
       open.push_back(std::string(key) + " in [images]");
       continue;
     }
@@ -93,24 +93,17 @@ Written cell_toml(const std::filesystem::path& folder) {
       calibrated = file->second;
     }
   }
-  if (!roles.unknown.empty()) images += "# other images here: " + listed(roles.unknown) + "\n";
-  std::string text =
-      "# Written by mbtfm init from the files of this folder. What is behind a # is a note or not used.\n\n";
+  if (!roles.unknown.empty()) images += line_of("unused", {listed(roles.unknown)});
+  std::string text = line_of("written") + "\n";
   if (pixel_size_um) {
-    text += "# The calibration of " + calibrated + " is " + shortest(*pixel_size_um) +
-            " um: each image's own is used. To overrule it:\n" + "# pixel_size_um = " + shortest(*pixel_size_um) + "\n";
+    const std::string size_um = shortest(*pixel_size_um);
+    text += line_of("pixel-size-known", {calibrated, size_um}) + "# pixel_size_um = " + size_um + "\n";
   } else {
-    text += "# pixel_size_um = 0.1    # needed, as no image has a calibration: side of a pixel on the specimen\n";
+    text += line_of("pixel-size-missing");
     open.emplace_back("pixel_size_um");
   }
-  text +=
-      "\n[gel]\n# youngs_modulus_kPa = 8.4    # needed: as measured; all forces are proportional to it\n"
-      "# shear_modulus_kPa = 2.8    # in its place, if a "
-      "rheometer gave G: E is about 3 G\n# poisson_ratio = 0.49    # of the gel; 0.49 if not given\n# thickness_um = "
-      "60    # of the gel; 60 if not "
-      "given\n"
-      "\n[images]\n" +
-      images;
+  text += "\n[gel]\n" + line_of("modulus") + line_of("shear-modulus") + line_of("poisson-ratio") +
+          line_of("thickness") + "\n[images]\n" + images;
   if (stacks) text += track_table(*stacks, open);
   open.insert(open.begin(), "youngs_modulus_kPa in [gel]");
   return {.text = text, .open = listed(open)};
