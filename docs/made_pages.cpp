@@ -10,7 +10,6 @@
 #include "continuum/solids/outputs.h"
 #include "mbtfm/mean/outputs.h"
 #include "mbtfm/sheets/bead_fit.h"
-#include "mbtfm/spatial/stage.h"
 #include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/findings.h"
@@ -141,8 +140,8 @@ std::string column_page() {
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
          sheet::pages_of_tables() + sheet::pages_of_cells() + sheets::pages_of_tables() + solids::pages_of_tables() +
-         mean::pages_of_tables() + spatial::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() +
-         statistics::pages_of_tables() + plan::pages_of_tables();
+         mean::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables() +
+         plan::pages_of_tables();
 }
 
 std::string made_page(const std::string& name, const std::filesystem::path& programs) {

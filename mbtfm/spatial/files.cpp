@@ -2,48 +2,17 @@
 #include <cmath>
 
 #include "mbtfm/spatial/stage.h"
-#include "pipeline/files/tables.h"
+#include "pipeline/files/space_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::spatial {
 namespace {
 
-using files::kResult;
-
-struct Row {
-  Vec3 position_um, traction_kPa;
-  std::optional<Vec3> sigma_kPa;
-  double area_um2 = 0;
-  std::optional<double> resolution_um;
-  double normal_kPa = 0, tangential_kPa = 0;
-  Vec3 displacement_um;
-};
-
-files::Table<Row> traction_table() {
-  return {.file = "traction_3d.csv",
-          .columns = {{"x_um", files::x_of(&Row::position_um)},
-                      {"y_um", files::y_of(&Row::position_um)},
-                      {"z_um", files::z_of(&Row::position_um)},
-                      {"tx_kPa", files::x_of(&Row::traction_kPa)},
-                      {"ty_kPa", files::y_of(&Row::traction_kPa)},
-                      {"tz_kPa", files::z_of(&Row::traction_kPa)},
-                      {"sigma_tx_kPa", files::member(&Row::sigma_kPa, &Vec3::x), kResult},
-                      {"sigma_ty_kPa", files::member(&Row::sigma_kPa, &Vec3::y), kResult},
-                      {"sigma_tz_kPa", files::member(&Row::sigma_kPa, &Vec3::z), kResult},
-                      {"resolution_um", &Row::resolution_um, kResult},
-                      {"normal_kPa", &Row::normal_kPa, kResult},
-                      {"tangential_kPa", &Row::tangential_kPa, kResult},
-                      {"area_um2", &Row::area_um2, kResult},
-                      {"ux_um", files::x_of(&Row::displacement_um), kResult},
-                      {"uy_um", files::y_of(&Row::displacement_um), kResult},
-                      {"uz_um", files::z_of(&Row::displacement_um), kResult}}};
-}
-
 /// As an even lattice of the smallest faces, which every reader understands.
 struct Shown {
   TractionMesh lattice;
-  std::vector<Row> rows;
+  std::vector<SurfaceTraction> rows;
 };
 
 Shown shown(const Problem& problem, const SpatialReconstruction& r) {
@@ -61,7 +30,7 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
         sum += share * Vec3{of[3 * vertex], of[3 * vertex + 1], of[3 * vertex + 2]};
       return sum;
     };
-    Row& row = all.rows.emplace_back();
+    SurfaceTraction& row = all.rows.emplace_back();
     row.position_um = {place.x, place.y, problem.ground.height_um(place)};
     row.traction_kPa = vector(r.traction_kPa);
     row.displacement_um = vector(u);
@@ -93,48 +62,25 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
   return all;
 }
 
-files::Table<PartForce> force_table() {
-  return {.file = "traction_3d_adhesion_forces.csv",
-          .columns = {{"adhesion_id", &PartForce::adhesion_id},
-                      {"x_um", files::x_of(&PartForce::position_um)},
-                      {"y_um", files::y_of(&PartForce::position_um)},
-                      {"z_um", files::z_of(&PartForce::position_um)},
-                      {"area_um2", &PartForce::area_um2, kResult},
-                      {"fx_nN", files::x_of(&PartForce::force_nN)},
-                      {"fy_nN", files::y_of(&PartForce::force_nN)},
-                      {"fz_nN", files::z_of(&PartForce::force_nN)},
-                      {"sigma_fx_nN", files::x_of(&PartForce::sigma_nN), kResult},
-                      {"sigma_fy_nN", files::y_of(&PartForce::sigma_nN), kResult},
-                      {"sigma_fz_nN", files::z_of(&PartForce::sigma_nN), kResult},
-                      {"force_nN", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
-                      {"sigma_nN", &PartForce::magnitude_sigma_nN, kResult},
-                      {"angle_deg", &PartForce::angle_deg, kResult},
-                      {"sigma_angle_deg", &PartForce::angle_sigma_deg, kResult}}};
-}
-
 }  // namespace
-
-std::string pages_of_tables() { return page_of(traction_table()) + page_of(force_table()); }
-
-void write_part_forces(const Path& file, const std::vector<PartForce>& forces) { write(file, force_table(), forces); }
 
 void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
                      const SpatialReconstruction& reconstruction) {
   const Shown all = shown(problem, reconstruction);
-  write(csv, traction_table(), all.rows);
+  files::write(csv, files::surface_traction_table(), all.rows);
   files::Grid grid;
   for (const auto& face : all.lattice.quads.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
-  for (const Row& row : all.rows) grid.points_um.push_back(row.position_um);
-  grid.point_arrays = {files::array_of("traction_kPa", all.rows, &Row::traction_kPa),
-                       files::array_of("normal_kPa", all.rows, &Row::normal_kPa),
-                       files::array_of("tangential_kPa", all.rows, &Row::tangential_kPa),
-                       files::array_of("displacement_um", all.rows, &Row::displacement_um)};
+  for (const SurfaceTraction& row : all.rows) grid.points_um.push_back(row.position_um);
+  grid.point_arrays = {files::array_of("traction_kPa", all.rows, &SurfaceTraction::traction_kPa),
+                       files::array_of("normal_kPa", all.rows, &SurfaceTraction::normal_kPa),
+                       files::array_of("tangential_kPa", all.rows, &SurfaceTraction::tangential_kPa),
+                       files::array_of("displacement_um", all.rows, &SurfaceTraction::displacement_um)};
   if (reconstruction.covariance_kPa2.size() > 0)
     grid.point_arrays.push_back(
-        files::array_of("sigma_traction_kPa", all.rows, [](const Row& row) { return *row.sigma_kPa; }));
+        files::array_of("sigma_traction_kPa", all.rows, [](const SurfaceTraction& row) { return *row.sigma_kPa; }));
   if (reconstruction.resolved.size() > 0)
     grid.point_arrays.push_back(
-        files::array_of("resolution_um", all.rows, [](const Row& row) { return *row.resolution_um; }));
+        files::array_of("resolution_um", all.rows, [](const SurfaceTraction& row) { return *row.resolution_um; }));
   files::write_quads_vtp(vtp, grid);
 }
 

@@ -11,21 +11,9 @@
 #include "mbtfm/spatial/traction_mesh.h"
 #include "mbtfm/tractions/parameters.h"
 #include "pipeline/contract/findings.h"
+#include "pipeline/contract/results_in_space.h"
 
 namespace mbtfm::spatial {
-
-/// The force on a part of the surface, an adhesion's.
-struct PartForce {
-  int adhesion_id = 0;
-  Vec3 position_um;
-  double area_um2 = 0;  ///< of the curved surface
-  Vec3 force_nN;
-  Vec3 sigma_nN;                  ///< standard error, with what smoothing took away
-  double magnitude_sigma_nN = 0;  ///< along the force
-  /// Its direction as seen from above, from +x towards +y, and the standard error of it: that of the force across
-  /// itself over its length, and not more than that of any direction, 180°/√3.
-  double angle_deg = 0, angle_sigma_deg = 0;
-};
 
 /// Tractions whose sums over parts of the surface are better than those of the map, which is smoothed or shortened for
 /// the sake of its single places: a sum has less noise than these, and as much of the bias.

@@ -9,6 +9,7 @@
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/space_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/parameters.h"
 #include "substrate/choice/large_strain.h"
@@ -51,7 +52,8 @@ void write_outputs(stage::StageContext& context, const Problem& problem, const S
   write_tractions(context.output("out"), context.output_beside("out", ".vtp"), problem, r);
   files::write_figures(context.output_beside("out", ".json"), summary);
   if (r.scan) write_scan(context, r, problem.gel.youngs_modulus_kPa);
-  if (!r.forces.empty()) write_part_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces);
+  if (!r.forces.empty())
+    files::write(context.output_beside("out", "_adhesion_forces.csv"), files::part_force_table(), r.forces);
 }
 
 std::string summary_line(const SpatialReconstruction& r, const Balance& balance) {

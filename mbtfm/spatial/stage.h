@@ -23,9 +23,6 @@ StageReport run_in_space(const StageParameters& parameters, stage::StageContext&
 /// A table with a row for each vertex, and the surface with the same.
 void write_tractions(const Path& csv, const Path& vtp, const Problem& problem,
                      const SpatialReconstruction& reconstruction);
-void write_part_forces(const Path& file, const std::vector<PartForce>& forces);
-/// Their part of docs/columns.md.
-std::string pages_of_tables();
 
 /// The criterion that chose lambda, or "given".
 const char* how_lambda(const SpatialReconstruction& reconstruction);

@@ -10,6 +10,8 @@
 namespace mbtfm::files {
 
 nlohmann::ordered_json json_of(const Value& value);
+/// None: null.
+nlohmann::ordered_json json_of(const std::optional<double>& value);
 nlohmann::ordered_json json_of(const Figures& figures);
 nlohmann::ordered_json json_of(const Effect& effect);
 nlohmann::ordered_json json_of(const Finding& finding);

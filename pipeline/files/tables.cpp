@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/space_files.h"
 
 namespace mbtfm::files {
 
@@ -209,7 +210,7 @@ std::string pages_of_cell_tables() {
          page_of(image_place_table()) + page_of(displacement_table()) + page_of(frame_table()) +
          page_of(tension_table()) + page_of(adhesion_force_table()) + page_of(missing_fibre_table()) +
          page_of(missing_adhesion_table()) + page_of(point_table()) + page_of(displacement_in_space_table()) +
-         page_of(reaction_table());
+         page_of(surface_traction_table()) + page_of(part_force_table()) + page_of(reaction_table());
 }
 
 }  // namespace mbtfm::files

@@ -295,12 +295,11 @@ Result result_in_plane(const Path& cell, const Path& report) {
             readable(series->last_nN) + " nN";
   nlohmann::ordered_json event = {{"event", "result"},
                                   {"total_force_nN", result.fit.total_force_nN},
-                                  {"total_force_error_nN", nullptr},
+                                  {"total_force_error_nN", files::json_of(result.total_error_nN)},
                                   {"mean_tension_nN", nlohmann::ordered_json::object()},
                                   {"fibres", result.n_fibres},
                                   {"uncertain", result.n_uncertain},
                                   {"report", report.string()}};
-  if (result.total_error_nN) event["total_force_error_nN"] = *result.total_error_nN;
   for (const auto& [type, of] : result.types) event["mean_tension_nN"][name_of(type)] = of.mean_nN;
   return {line, files::json_text(event) + "\n"};
 }

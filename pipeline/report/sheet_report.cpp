@@ -96,10 +96,6 @@ Result result_of_sheet(const Path& cell, const Path& report) {
                                   {"mean_tension_nN_per_um", tension},
                                   {"estimates", nlohmann::ordered_json::array()},
                                   {"report", report.string()}};
-  const auto or_null = [](const std::optional<double>& value) -> nlohmann::ordered_json {
-    if (value) return *value;
-    return nullptr;
-  };
   for (const SheetEstimate& e : r.estimates) {
     nlohmann::ordered_json parts = nlohmann::ordered_json::object();
     for_each_part(e.parts, [&](const char* name, const std::optional<double>& size) {
@@ -108,9 +104,9 @@ Result result_of_sheet(const Path& cell, const Path& report) {
     event["estimates"].push_back({{"quantity", name_of(e.quantity)},
                                   {"part", e.part},
                                   {"value", e.value},
-                                  {"sigma", or_null(e.sigma)},
-                                  {"low", or_null(e.low)},
-                                  {"high", or_null(e.high)},
+                                  {"sigma", files::json_of(e.sigma)},
+                                  {"low", files::json_of(e.low)},
+                                  {"high", files::json_of(e.high)},
                                   {"sigma_parts", parts}});
   }
   return {r.figures.at("fitted").text() + "; mean tension " + readable(tension) + " nN/µm; total force " +

@@ -20,7 +20,7 @@ using charts::Chart;
 Vec2 spacing_of(const SpaceResults& r) { return {r.number("spacing_x_um"), r.number("spacing_y_um")}; }
 
 Chart new_map(const SpaceResults& r, const std::string& title) {
-  const auto [low, high] = extent_of(r.tractions, &SurfaceTraction::at_um);
+  const auto [low, high] = extent_of(r.tractions, &SurfaceTraction::position_um);
   const Vec2 half = 0.5 * spacing_of(r);
   return empty_map({low - half, high + half}, title);
 }
@@ -32,9 +32,10 @@ void draw_cells(Chart& map, const SpaceResults& r, const Value& value, const Col
   for (const SurfaceTraction& t : r.tractions) {
     const std::optional<double> v = value(t);
     if (!v) continue;
-    const Vec2 at{t.at_um.x, t.at_um.y};
-    map.bar(at - half, at + half, "fill:" + colour(*v) + ";stroke:none",
-            fmt::format("{} {} at x, y, z = {:.1f}, {:.1f}, {:.1f} µm", readable(*v), unit, at.x, at.y, t.at_um.z));
+    const Vec2 at{t.position_um.x, t.position_um.y};
+    map.bar(
+        at - half, at + half, "fill:" + colour(*v) + ";stroke:none",
+        fmt::format("{} {} at x, y, z = {:.1f}, {:.1f}, {:.1f} µm", readable(*v), unit, at.x, at.y, t.position_um.z));
   }
 }
 
@@ -205,13 +206,15 @@ void add_arrows(const SpaceResults& results, const Paper& paper, std::vector<Pie
                                     results.surface.high_um().y - results.surface.origin_um.y);
   const double um_per_kPa = extent_um / 7 / largest;
   for (const SurfaceTraction* t : arrows) {
-    const Vec3 from = t->at_um, to = from + um_per_kPa * t->traction_kPa;
+    const Vec3 from = t->position_um, to = from + um_per_kPa * t->traction_kPa;
     const Vec2 start = paper.px(from), shift = paper.px(to) - start;
     constexpr double kOverItsFacet_um = 3;  // else the next facet hides its foot
     pieces.push_back(
         {std::max(seen(from).near, seen(to).near) + kOverItsFacet_um,
-         fmt::format("<path transform=\"translate({})\" d=\"{}\" fill=\"none\" stroke=\"#111\" stroke-width=\"1.3\"/>",
-                     point(start), charts::arrow_path(shift))});
+         fmt::format(
+             "<g transform=\"translate({0})\" fill=\"none\"><path d=\"{1}\" stroke=\"#fff\" stroke-width=\"3.2\"/>"
+             "<path d=\"{1}\" stroke=\"#111\" stroke-width=\"1.3\"/></g>",
+             point(start), charts::arrow_path(shift))});
   }
 }
 
@@ -261,7 +264,7 @@ Figure tangential_map(const SpaceResults& r) {
   for (std::size_t k = 0; k < vectors.size(); ++k) {
     constexpr double kShown = 0.15;  // of the longest: shorter ones are dots
     if (norm(vectors[k]) < kShown * scale.top) continue;
-    const Vec3 at = r.tractions[k].at_um;
+    const Vec3 at = r.tractions[k].position_um;
     figure.chart.arrow({at.x, at.y}, scale.px_per_unit * vectors[k], "fill:none;stroke:#fff;stroke-width:1.2");
   }
   return figure;
@@ -298,7 +301,7 @@ std::vector<Figure> bead_slices(const SpaceResults& r) {
   std::vector<Figure> figures;
   for (const Plane& plane : {Plane{"Beads in a slice along x", "y", "x (µm)", &Vec3::x, &Vec3::y},
                              Plane{"Beads in a slice along y", "x", "y (µm)", &Vec3::y, &Vec3::x}}) {
-    const double at_um = strongest->at_um.*plane.y;
+    const double at_um = strongest->position_um.*plane.y;
     Chart chart(plane.title, {plane.along, low, high}, {"z (µm), into the gel", bottom + 2, top - 2});
     chart.same_scales();
     chart.curve(surface_in(plane, r.surface, at_um), "fill:none;stroke:#111;stroke-width:1.6");

@@ -127,19 +127,19 @@ std::string lambda_section(const SpaceResults& r) {
 
 std::string force_section(const SpaceResults& r) {
   if (r.forces.empty()) return {};
-  std::vector<ForceInSpace> forces = r.forces;
-  std::ranges::stable_sort(forces, std::greater{}, [](const ForceInSpace& f) { return norm(f.force_nN); });
+  std::vector<PartForce> forces = r.forces;
+  std::ranges::stable_sort(forces, std::greater{}, [](const PartForce& f) { return norm(f.force_nN); });
   Table table{
       "Forces of the adhesions",
       {number("adhesion"), number("force (nN)"), number("std. error (nN)"), number("Fx (nN)"), number("Fy (nN)"),
        number("Fz (nN), into the gel"), number("area (µm²)"), number("x (µm)"), number("y (µm)"), number("z (µm)")}};
-  for (const ForceInSpace& f : forces) {
-    const std::optional<int> decimals = decimals_for(f.sigma_nN);
+  for (const PartForce& f : forces) {
+    const std::optional<int> decimals = decimals_for(f.magnitude_sigma_nN);
     table.rows.push_back({std::to_string(f.adhesion_id), rounded(norm(f.force_nN), decimals),
-                          rounded(f.sigma_nN, decimals), rounded(f.force_nN.x, decimals),
+                          rounded(f.magnitude_sigma_nN, decimals), rounded(f.force_nN.x, decimals),
                           rounded(f.force_nN.y, decimals), rounded(f.force_nN.z, decimals), rounded(f.area_um2, 2),
-                          fmt::format("{:.1f}", f.at_um.x), fmt::format("{:.1f}", f.at_um.y),
-                          fmt::format("{:.1f}", f.at_um.z)});
+                          fmt::format("{:.1f}", f.position_um.x), fmt::format("{:.1f}", f.position_um.y),
+                          fmt::format("{:.1f}", f.position_um.z)});
   }
   const Path file = r.folder / "4_traction/traction_adhesion_forces.csv";
   return section(
@@ -195,15 +195,11 @@ Result result_in_space(const Path& cell, const Path& report) {
   const std::string line = "total force " + with_error(r.number("total_force_nN"), total_sigma_nN, "nN") +
                            "; net force " + with_error(force.size, force.sigma, "nN") + "; strain energy " +
                            readable(r.number("strain_energy_fJ")) + " fJ";
-  const auto or_null = [](const std::optional<double>& value) -> nlohmann::ordered_json {
-    if (value) return *value;
-    return nullptr;
-  };
   const nlohmann::ordered_json event = {{"event", "result"},
                                         {"total_force_nN", r.number("total_force_nN")},
-                                        {"total_force_error_nN", or_null(total_sigma_nN)},
+                                        {"total_force_error_nN", files::json_of(total_sigma_nN)},
                                         {"net_force_nN", force.size},
-                                        {"net_force_error_nN", or_null(force.sigma)},
+                                        {"net_force_error_nN", files::json_of(force.sigma)},
                                         {"strain_energy_fJ", r.number("strain_energy_fJ")},
                                         {"report", report.string()}};
   return {line, files::json_text(event) + "\n"};

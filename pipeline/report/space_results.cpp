@@ -10,6 +10,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/files/space_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/parameters.h"
 
@@ -26,42 +27,6 @@ std::vector<Vec2> from_above(const std::vector<Vec3>& places) {
 
 Vec3 vector_in(const files::CsvTable& table, int row, const char* x, const char* y, const char* z) {
   return {table.number(row, x), table.number(row, y), table.number(row, z)};
-}
-
-std::vector<SurfaceTraction> read_tractions(const Path& file) {
-  const files::CsvTable table(file);
-  table.require({"x_um", "y_um", "z_um", "tx_kPa", "ty_kPa", "tz_kPa", "normal_kPa", "tangential_kPa", "area_um2",
-                 "sigma_tx_kPa", "sigma_ty_kPa", "sigma_tz_kPa", "resolution_um"});
-  std::vector<SurfaceTraction> list;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    SurfaceTraction& t = list.emplace_back();
-    t.at_um = vector_in(table, row, "x_um", "y_um", "z_um");
-    t.traction_kPa = vector_in(table, row, "tx_kPa", "ty_kPa", "tz_kPa");
-    t.normal_kPa = table.number(row, "normal_kPa");
-    t.tangential_kPa = table.number(row, "tangential_kPa");
-    t.area_um2 = table.number(row, "area_um2");
-    t.resolution_um = table.optional_number(row, "resolution_um");
-    const auto x = table.optional_number(row, "sigma_tx_kPa"), y = table.optional_number(row, "sigma_ty_kPa"),
-               z = table.optional_number(row, "sigma_tz_kPa");
-    if (x && y && z) t.sigma_kPa = Vec3{*x, *y, *z};
-  }
-  if (list.size() < 4) throw InputError(file.string(), "tractions at four places or more", std::to_string(list.size()));
-  return list;
-}
-
-std::vector<ForceInSpace> read_forces(const Path& file) {
-  if (!files::is_own_file(file)) return {};
-  const files::CsvTable table(file);
-  table.require({"adhesion_id", "x_um", "y_um", "z_um", "fx_nN", "fy_nN", "fz_nN", "area_um2", "sigma_nN"});
-  std::vector<ForceInSpace> list;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    list.push_back({.adhesion_id = table.integer(row, "adhesion_id", 1),
-                    .at_um = vector_in(table, row, "x_um", "y_um", "z_um"),
-                    .force_nN = vector_in(table, row, "fx_nN", "fy_nN", "fz_nN"),
-                    .area_um2 = table.number(row, "area_um2"),
-                    .sigma_nN = table.optional_number(row, "sigma_nN")});
-  }
-  return list;
 }
 
 void read_figures(const Path& file, SpaceResults& results) {
@@ -100,8 +65,11 @@ SpaceResults read_space_results(const Path& cell) {
   stage::read_toml(list, cell / "cell.toml");
   results.surface = files::read_surface(cell / "3_surface/surface.vtp");
   results.beads = files::read_displacement_in_space(cell / kBeadsInSpace);
-  results.tractions = read_tractions(cell / "4_traction/traction.csv");
-  results.forces = read_forces(cell / "4_traction/traction_adhesion_forces.csv");
+  const Path tractions = cell / "4_traction/traction.csv", forces = cell / "4_traction/traction_adhesion_forces.csv";
+  results.tractions = files::read(tractions, files::surface_traction_table());
+  if (results.tractions.size() < 4)
+    throw InputError(tractions.string(), "tractions at four places or more", std::to_string(results.tractions.size()));
+  if (files::is_own_file(forces)) results.forces = files::read(forces, files::part_force_table());
   if (!results.forces.empty()) results.adhesions = files::read_adhesions(cell / "1_segment/adhesions.csv");
   if (files::is_own_file(cell / "1_segment/outline.csv"))
     results.outline_um = files::read_outline(cell / "1_segment/outline.csv").front();
@@ -115,7 +83,7 @@ SpaceMap map_of(const SpaceResults& results) {
   double errors = 0, size = 0;
   bool has_errors = true;
   for (const SurfaceTraction& t : results.tractions) {
-    map.at_um.push_back(t.at_um);
+    map.at_um.push_back(t.position_um);
     map.traction_kPa.push_back(t.traction_kPa);
     map.area_um2.push_back(t.area_um2);
     size += t.area_um2 * dot(t.traction_kPa, t.traction_kPa);

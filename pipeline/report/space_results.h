@@ -10,28 +10,13 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/path.h"
+#include "pipeline/contract/results_in_space.h"
 #include "pipeline/contract/surface.h"
 
 namespace mbtfm::report {
 
 /// The beads of such a cell, in its folder.
 inline constexpr const char* kBeadsInSpace = "2_track/displacement_3d.csv";
-
-/// A row of 4_traction/traction.csv.
-struct SurfaceTraction {
-  Vec3 at_um, traction_kPa;
-  std::optional<Vec3> sigma_kPa;
-  std::optional<double> resolution_um;
-  double normal_kPa = 0, tangential_kPa = 0, area_um2 = 0;
-};
-
-/// A row of 4_traction/traction_adhesion_forces.csv.
-struct ForceInSpace {
-  int adhesion_id = 0;
-  Vec3 at_um, force_nN;
-  double area_um2 = 0;
-  std::optional<double> sigma_nN;  ///< along the force
-};
 
 struct SpaceResults {
   Path folder;
@@ -40,7 +25,7 @@ struct SpaceResults {
   HeightMap surface;
   std::vector<BeadInSpace> beads;
   std::vector<SurfaceTraction> tractions;
-  std::vector<ForceInSpace> forces;  ///< empty: no adhesions are known
+  std::vector<PartForce> forces;  ///< empty: no adhesions are known
   std::vector<Adhesion> adhesions;
   Polygon outline_um;  ///< empty: not known
   std::map<std::string, double> numbers;

@@ -93,10 +93,10 @@ StudyCell read_study_cell_in_space(const Path& folder, const std::string& name) 
                                     .net_force_nN = norm(results.vector("net_force", "nN")),
                                     .net_moment_nN_um = norm(results.vector("moment", "nN_um")),
                                     .resolution_um = results.find("median_resolution_um")}};
-  for (const report::SurfaceTraction& t : results.tractions)
+  for (const SurfaceTraction& t : results.tractions)
     c.space->largest_traction_kPa = std::max(c.space->largest_traction_kPa, norm(t.traction_kPa));
-  for (const report::ForceInSpace& f : results.forces)
-    c.space->adhesions.push_back({f.adhesion_id, norm(f.force_nN), f.sigma_nN});
+  for (const PartForce& f : results.forces)
+    c.space->adhesions.push_back({f.adhesion_id, norm(f.force_nN), f.magnitude_sigma_nN});
   c.cell.outline_um = results.outline_um;
   c.fit.relative_l2 = results.number("relative_l2");
   c.fit.noise_um = results.number("noise_um");

@@ -196,7 +196,7 @@ std::vector<Index> random_part(std::size_t n_all, std::size_t n, drawing::Random
   return order;
 }
 
-std::vector<spatial::PartForce> found_in(const SpaceScene& scene, const spatial::Problem& problem) {
+std::vector<PartForce> found_in(const SpaceScene& scene, const spatial::Problem& problem) {
   tractions::TractionParameters traction = scene.traction;
   traction.method = tractions::TractionMethod::tikhonov;  // the forces of adhesions of group-l1 are those of it
   return spatial::reconstruct(problem, {{}, scene.gel, adhesions_of(scene), scene.outline_um}, traction, scene.spatial,
@@ -226,7 +226,7 @@ Drawn draw_experiments(const SpaceScene& scene, const SpacePool& pool, const Spa
                        const Point& point, int n_experiments, const Work& work) {
   Drawn drawn{.point = point, .n_experiments = n_experiments};
   work.tell(0.8, "drawing experiments");
-  std::vector<std::vector<spatial::PartForce>> found(static_cast<std::size_t>(n_experiments));
+  std::vector<std::vector<PartForce>> found(static_cast<std::size_t>(n_experiments));
   numerics::parallel_for(n_experiments, work.threads, [&](int k) {
     constexpr std::uint64_t kFirst = 100;  // far from the stream of the pool
     drawing::Random places(scene.seed, drawing::Stream::beads, kFirst + static_cast<std::uint64_t>(k)),

@@ -10,10 +10,11 @@
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/space_files.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/texts.h"
 #include "pipeline/stage/parameters.h"
 #include "samples/colonies/parameters.h"
 #include "samples/gels/folder.h"
@@ -154,15 +155,11 @@ std::vector<SpacePatch> patches_of(const std::filesystem::path& folder) {
       "a plan asks for the forces of adhesions: give their image, and run the cell again: mbtfm run";
   if (!std::filesystem::exists(file))
     throw InputError(file.string(), "forces of the cell's adhesions", "no such file", kRemedy);
-  const files::CsvTable table(file);
-  table.require({"adhesion_id", "fx_nN", "fy_nN", "fz_nN"});
+  const std::vector<PartForce> forces = files::read(file, files::part_force_table());
   std::vector<SpacePatch> patches;
-  for (const Adhesion& a : files::read_adhesions(folder / "1_segment/adhesions.csv")) {
-    for (int row = 0; row < table.n_rows(); ++row) {
-      if (table.integer(row, "adhesion_id", 1) != a.adhesion_id) continue;
-      patches.push_back({a, {table.number(row, "fx_nN"), table.number(row, "fy_nN"), table.number(row, "fz_nN")}});
-    }
-  }
+  for (const Adhesion& a : files::read_adhesions(folder / "1_segment/adhesions.csv"))
+    for (const PartForce& f : forces)
+      if (f.adhesion_id == a.adhesion_id) patches.push_back({a, f.force_nN});
   if (patches.empty())
     throw InputError(file.string(), "forces of the adhesions of 1_segment/adhesions.csv", "none of them", kRemedy);
   return patches;
@@ -219,9 +216,7 @@ namespace {
 std::vector<std::string> warnings_of(spatial::BeadLoss loss) {
   using enum spatial::BeadLoss;
   if (loss == l2 || loss == mixture) return {};
-  return {std::string("The cell is evaluated with traction.loss = ") + name_of(loss) +
-          ", and the plan's errors are those of l2: yours are larger. Mixture has those of l2 where no bead is "
-          "wrong."};
+  return {report::sentence("plan.other-loss", name_of(loss))};
 }
 
 }  // namespace
