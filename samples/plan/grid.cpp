@@ -6,7 +6,6 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/texts.h"
 #include "samples/plan/adhesion_pair.h"
 #include "substrate/choice/large_strain.h"
@@ -15,52 +14,19 @@ namespace mbtfm::plan {
 
 namespace {
 
-/// Of one estimate: what the beads make, and what the rest makes.
+/// Of estimates of one quantity: as a whole, by the beads, and by the rest.
 struct Errors {
-  double beads_nN = 0;
-  OtherParts other;
-  double total_nN() const { return std::hypot(beads_nN, other.total_nN()); }
+  std::vector<double> all_nN = {}, beads_nN = {}, mesh_nN = {}, segmentation_nN = {}, other_nN = {};
+  void add(double by_beads_nN, const OtherParts& other) {
+    all_nN.push_back(std::hypot(by_beads_nN, other.total_nN()));
+    beads_nN.push_back(by_beads_nN);
+    mesh_nN.push_back(other.mesh_nN);
+    segmentation_nN.push_back(other.segmentation_nN);
+    other_nN.push_back(other.other_nN);
+  }
 };
 
 double scale_of(const Point& p) { return p.noise_um * p.youngs_modulus_kPa; }
-
-std::vector<Errors> errors_of_tensions(const Computed& c, const Precision& unit, double scale,
-                                       const std::vector<std::size_t>& labels) {
-  std::vector<Errors> errors;
-  for (const std::size_t i : labels)
-    errors.push_back({scale * unit.tensions[static_cast<Eigen::Index>(i)], c.model.tensions[i]});
-  return errors;
-}
-
-std::vector<Errors> errors_of_forces(const Eigen::VectorXd& unit, double scale, const Eigen::VectorXd& model_nN) {
-  std::vector<Errors> errors;
-  for (Eigen::Index a = 0; a < unit.size(); ++a)
-    errors.push_back({scale * unit[a], {.other_nN = model_nN.size() > 0 ? model_nN[a] : 0}});
-  return errors;
-}
-
-template <class Of>
-double median_of(const std::vector<Errors>& errors, const Of& of) {
-  std::vector<double> values;
-  for (const Errors& e : errors) values.push_back(of(e));
-  return numerics::median_in(values);
-}
-
-Expected expected_of(const Point& point, Quantity quantity, const std::vector<Errors>& errors, double target_nN) {
-  std::vector<double> totals_nN;
-  for (const Errors& e : errors) totals_nN.push_back(e.total_nN());
-  return {.point = point,
-          .quantity = quantity,
-          .n = static_cast<int>(errors.size()),
-          .standard_error_nN = median_of(errors, [](const Errors& e) { return e.total_nN(); }),
-          .from_beads_nN = median_of(errors, [](const Errors& e) { return e.beads_nN; }),
-          .from_mesh_nN = median_of(errors, [](const Errors& e) { return e.other.mesh_nN; }),
-          .from_segmentation_nN = median_of(errors, [](const Errors& e) { return e.other.segmentation_nN; }),
-          .from_other_nN = median_of(errors, [](const Errors& e) { return e.other.other_nN; }),
-          .target_nN = target_nN,
-          .share_within = share_within(totals_nN, target_nN),
-          .smallest_seen_nN = kSeen * median_of(errors, [](const Errors& e) { return e.total_nN(); })};
-}
 
 /// Of the cell on its own gel; it falls with the modulus.
 struct OnOwnGel {
@@ -79,35 +45,32 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
                                const Point& point) {
   const double scale = scale_of(point);
   std::vector<Expected> all;
+  const auto add = [&](Quantity quantity, Errors errors, double target_nN) {
+    Expected& e = all.emplace_back(expected_by(point, quantity, errors.all_nN, errors.beads_nN, target_nN));
+    e.from_mesh_nN = numerics::median_in(errors.mesh_nN);
+    e.from_segmentation_nN = numerics::median_in(errors.segmentation_nN);
+    e.from_other_nN = numerics::median_in(errors.other_nN);
+  };
   const auto add_fibres = [&](Quantity quantity, std::optional<FibreType> type) {
-    const std::vector<std::size_t> labels = labels_of(scene, c.cell, type);
-    if (!labels.empty())
-      all.push_back(expected_of(point, quantity, errors_of_tensions(c, unit, scale, labels), asked.target_nN));
+    Errors errors;
+    for (const std::size_t i : labels_of(scene, c.cell, type))
+      errors.add(scale * unit.tensions[static_cast<Eigen::Index>(i)], c.model.tensions[i]);
+    if (!errors.all_nN.empty()) add(quantity, errors, asked.target_nN);
   };
   add_fibres(Quantity::fibres, {});
   for (std::size_t k = 0; k < std::size(kFibreTypes); ++k) add_fibres(kOfTypes[k], kFibreTypes[k]);
-  const double network_nN = scale * unit.tensions[0] * c.model.network_force_nN / c.cell.tensions_nN[0];
-  all.push_back(expected_of(point, Quantity::network_force, {{network_nN, c.model.network_force}},
-                            asked.within * c.model.network_force_nN));
-  all.push_back(expected_of(point, Quantity::total_force, {{scale * unit.total_force, c.model.total_force}},
-                            asked.within * c.model.total_force_nN));
-  all.push_back(expected_of(point, Quantity::adhesion_force,
-                            errors_of_forces(unit.adhesion_forces, scale, c.model.adhesion_forces_nN),
-                            asked.target_nN));
-  all.push_back(
-      expected_of(point, Quantity::free_force, errors_of_forces(unit.free_forces, scale, {}), asked.target_nN));
+  Errors network, total, with_network, alone;
+  network.add(scale * unit.tensions[0] * c.model.network_force_nN / c.cell.tensions_nN[0], c.model.network_force);
+  total.add(scale * unit.total_force, c.model.total_force);
+  for (Eigen::Index a = 0; a < unit.adhesion_forces.size(); ++a) {
+    with_network.add(scale * unit.adhesion_forces[a], {.other_nN = c.model.adhesion_forces_nN[a]});
+    alone.add(scale * unit.free_forces[a], {});
+  }
+  add(Quantity::network_force, network, asked.within * c.model.network_force_nN);
+  add(Quantity::total_force, total, asked.within * c.model.total_force_nN);
+  add(Quantity::adhesion_force, with_network, asked.target_nN);
+  add(Quantity::free_force, alone, asked.target_nN);
   return all;
-}
-
-Expected expected_of_fttc(const Point& point, const std::vector<double>& errors_nN, double target_nN) {
-  const double error_nN = robust_error(errors_nN);
-  return {.point = point,
-          .quantity = Quantity::fttc_force,
-          .n = static_cast<int>(errors_nN.size()),
-          .standard_error_nN = error_nN,
-          .target_nN = target_nN,
-          .share_within = share_within(errors_nN, target_nN),
-          .smallest_seen_nN = kSeen * error_nN};
 }
 
 /// Density at which a tension's standard error is the target; infinite where what is left without noise is more, or
@@ -123,28 +86,6 @@ double needed_beads_per_um2(const Computed& c, std::size_t label, double target_
     (unit_error(c.densities, label, middle) > wanted ? low : high) = middle;
   }
   return high;
-}
-
-/// At which this share of the fibres has it.
-std::optional<double> needed_by_share(const Computed& c, double share, double target_nN, double scale) {
-  std::vector<double> needed;
-  for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i)
-    needed.push_back(needed_beads_per_um2(c, i, target_nN, scale));
-  const std::optional<double> density = density_of_share(std::move(needed), share);
-  return density ? std::optional(std::max(c.densities.beads_per_um2.front(), *density)) : std::nullopt;
-}
-
-std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, const Scene& scene) {
-  const OnOwnGel own = on_own_gel(c);
-  std::vector<std::string> warnings;
-  for (const double E : asked.youngs_modulus_kPa) {
-    const double largest_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
-    for (const double noise_um : asked.noise_um)
-      if (largest_um < kOfNoise * noise_um) warnings.push_back(sentence_of_noise(E, largest_um, noise_um));
-    const double left_out = choice::left_out_at_beads(with_modulus(scene.fit.gel, E), own.traction_kPa);
-    if (left_out > kBeyondLinear) warnings.push_back(sentence_of_strain(E, left_out));
-  }
-  return warnings;
 }
 
 void check_densities(const Scene& scene, const std::vector<double>& beads_per_um2) {
@@ -189,24 +130,37 @@ std::vector<std::size_t> labels_of(const Scene& scene, const KnownCell& cell, st
   return labels;
 }
 
-double share_within(const std::vector<double>& errors_nN, double target_nN) {
-  const auto n_within = std::ranges::count_if(errors_nN, [&](double e) { return e <= target_nN; });
-  return static_cast<double>(n_within) / static_cast<double>(errors_nN.size());
+Needed needed_by(double youngs_modulus_kPa, double noise_um, std::vector<double> densities) {
+  const auto of_share = [&](double share) {
+    const auto n = static_cast<double>(densities.size());
+    const double density =
+        numerics::of_rank_in(densities, std::min(densities.size() - 1, static_cast<std::size_t>(share * n)));
+    return std::isfinite(density) ? std::optional(density) : std::nullopt;
+  };
+  constexpr double kMost = 0.9;
+  return {youngs_modulus_kPa, noise_um, of_share(0.5), of_share(kMost)};
 }
 
-std::optional<double> density_of_share(std::vector<double> needed, double share) {
-  const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
-  const double density = numerics::of_rank_in(needed, rank);
-  return std::isfinite(density) ? std::optional(density) : std::nullopt;
+template <class Quantity>
+std::vector<std::string> warnings_of(const Asked& asked, const GridOf<Quantity>& grid, Quantity quantity) {
+  constexpr double kOfNoise = 3;          // a largest displacement below so many times the noise is hardly seen
+  constexpr double kBeyondLinear = 0.05;  // as the caution large-strain of the fit
+  std::vector<std::string> warnings;
+  for (const double E : asked.youngs_modulus_kPa) {
+    const auto at = [&](double density, double noise_um) -> const ExpectedOf<Quantity>& {
+      return expected_of(grid, {E, density, noise_um}, quantity);
+    };
+    for (const double noise_um : asked.noise_um)
+      if (const double largest_um = at(asked.densities.front(), noise_um).largest_displacement_um;
+          largest_um < kOfNoise * noise_um)
+        warnings.push_back(report::sentence("plan.unseen", brief(E), brief(largest_um), brief(noise_um)));
+    if (const double left_out = at(asked.densities.back(), asked.noise_um.back()).left_out; left_out > kBeyondLinear)
+      warnings.push_back(report::sentence("plan.beyond-linear", brief(E), brief(100 * left_out)));
+  }
+  return warnings;
 }
-
-std::string sentence_of_noise(double youngs_modulus_kPa, double largest_um, double noise_um) {
-  return report::sentence("plan.unseen", brief(youngs_modulus_kPa), brief(largest_um), brief(noise_um));
-}
-
-std::string sentence_of_strain(double youngs_modulus_kPa, double left_out) {
-  return report::sentence("plan.beyond-linear", brief(youngs_modulus_kPa), brief(100 * left_out));
-}
+template std::vector<std::string> warnings_of(const Asked&, const Grid&, Quantity);
+template std::vector<std::string> warnings_of(const Asked&, const SpaceGrid&, SpaceQuantity);
 
 double most_beads_per_um2(const Scene& scene) {
   // of discs at random that keep this distance: they jam at 0.547 of the area (Feder, J. Theor. Biol. 87, 237 (1980)),
@@ -259,7 +213,9 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int thre
     const auto density =
         static_cast<std::size_t>(std::ranges::find(asked.densities, point.density) - asked.densities.begin());
     std::vector<Expected> all = at_point(scene, asked, c, c.densities.precision[density], point);
-    all.push_back(expected_of_fttc(point, of_fttc[i], asked.target_nN));
+    Expected& usual = all.emplace_back(expected_by(point, Quantity::fttc_force, of_fttc[i], {}, asked.target_nN));
+    usual.standard_error_nN = robust_error(of_fttc[i]);
+    usual.smallest_seen_nN = kSeen * usual.standard_error_nN;
     for (Expected& e : all) {
       e.largest_displacement_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
       e.left_out = choice::left_out_at_beads(with_modulus(scene.fit.gel, E), own.traction_kPa);
@@ -271,16 +227,18 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c, int thre
   if (c.cell.fibre_ids.size() > 1) {
     for (const double E : asked.youngs_modulus_kPa) {
       for (const double noise_um : asked.noise_um) {
-        constexpr double kMost = 0.9;
-        const auto needed = [&](double share) { return needed_by_share(c, share, asked.target_nN, noise_um * E); };
-        grid.needed.push_back({E, noise_um, needed(0.5), needed(kMost)});
+        std::vector<double> needed;
+        for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i)
+          needed.push_back(
+              std::max(asked.densities.front(), needed_beads_per_um2(c, i, asked.target_nN, noise_um * E)));
+        grid.needed.push_back(needed_by(E, noise_um, std::move(needed)));
       }
     }
     std::vector<double> other_nN;
     for (std::size_t i = 1; i < c.model.tensions.size(); ++i) other_nN.push_back(c.model.tensions[i].total_nN());
     grid.model_error_nN = numerics::median_in(other_nN);
   }
-  grid.warnings = warnings_of(asked, c, scene);
+  grid.warnings = warnings_of(asked, grid, Quantity::total_force);
   return grid;
 }
 

@@ -10,6 +10,8 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/words.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "samples/plan/parameters.h"
 
 namespace mbtfm::plan {
 
@@ -129,7 +131,6 @@ struct Drawn {
 /// Set the last two.
 void sum_up(Drawn& drawn);
 
-struct Asked;
 /// By gel, density, noise.
 std::vector<Point> points_of(const Asked& asked);
 Gel with_modulus(Gel gel, double youngs_modulus_kPa);
@@ -137,15 +138,26 @@ double median_area_um2(const std::vector<Adhesion>& adhesions);
 
 /// Three standard errors are the smallest force seen: chance passes it once in 700 times.
 constexpr double kSeen = 3;
-/// Of errors, those that are the target or less.
-double share_within(const std::vector<double>& errors_nN, double target_nN);
-/// The density at which this share of fibres or patches meets the target; none if that is infinite.
-/// @param needed  of each; infinite: none
-std::optional<double> density_of_share(std::vector<double> needed, double share);
+/// Of estimates of one quantity. @param by_beads_nN  their parts by the noise of the beads; may be empty
+template <class Quantity>
+ExpectedOf<Quantity> expected_by(const Point& point, Quantity quantity, std::vector<double> errors_nN,
+                                 std::vector<double> by_beads_nN, double target_nN) {
+  ExpectedOf<Quantity> e{.point = point, .quantity = quantity, .n = static_cast<int>(errors_nN.size())};
+  const auto n_within = std::ranges::count_if(errors_nN, [&](double error_nN) { return error_nN <= target_nN; });
+  e.standard_error_nN = numerics::median_in(errors_nN);
+  if (!by_beads_nN.empty()) e.from_beads_nN = numerics::median_in(by_beads_nN);
+  e.target_nN = target_nN;
+  e.share_within = static_cast<double>(n_within) / e.n;
+  e.smallest_seen_nN = kSeen * e.standard_error_nN;
+  return e;
+}
 
-constexpr double kOfNoise = 3;          ///< a largest displacement below so many times the noise is hardly seen
-constexpr double kBeyondLinear = 0.05;  ///< as the caution large-strain of the fit
-std::string sentence_of_noise(double youngs_modulus_kPa, double largest_um, double noise_um);
-std::string sentence_of_strain(double youngs_modulus_kPa, double left_out);
+/// The densities at which half and nine in ten of the fibres or patches meet the target.
+/// @param densities  at which each does; infinite: at none
+Needed needed_by(double youngs_modulus_kPa, double noise_um, std::vector<double> densities);
+
+/// Gels on which the cell is hardly seen, or strained beyond linear elasticity. @param quantity  one of the grid
+template <class Quantity>
+std::vector<std::string> warnings_of(const Asked& asked, const GridOf<Quantity>& grid, Quantity quantity);
 
 }  // namespace mbtfm::plan

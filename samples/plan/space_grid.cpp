@@ -8,8 +8,8 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "pipeline/report/texts.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::plan {
@@ -192,29 +192,18 @@ Needed needed_of(const SpaceScene& scene, const Asked& asked, const SpaceForesee
   for (const std::vector<double>& errors : by_patch)
     needed.push_back(
         needed_beads(asked.densities, errors, asked.target_nN).value_or(std::numeric_limits<double>::infinity()));
-  constexpr double kMost = 0.9;
-  return {E, noise_um, density_of_share(needed, 0.5), density_of_share(needed, kMost)};
+  return needed_by(E, noise_um, std::move(needed));
 }
 
-std::vector<std::string> warnings_of(const SpaceScene& scene, const Asked& asked, const SpaceGrid& grid) {
+/// Gels on which the beads tell less of the tractions than any map needs.
+void add_few_numbers(const Asked& asked, SpaceGrid& grid) {
   constexpr double kFewNumbers = 24;  // as of the stage
-  std::vector<std::string> warnings = scene.warnings;
   for (const double E : asked.youngs_modulus_kPa) {
-    double told = 0;
-    const SpaceExpected* last = nullptr;
-    for (const SpaceExpected& e : grid.expected) {
-      if (e.quantity != SpaceQuantity::force || e.point.youngs_modulus_kPa != E) continue;
-      last = &e;
-      if (e.point.density == asked.densities.front() && e.largest_displacement_um < kOfNoise * e.point.noise_um)
-        warnings.push_back(sentence_of_noise(E, e.largest_displacement_um, e.point.noise_um));
-      if (e.point.noise_um == asked.noise_um.front()) told = std::max(told, e.degrees);
-    }
-    if (told < kFewNumbers)
-      warnings.push_back("On " + brief(E) + " kPa the beads tell " + brief(told) +
-                         " numbers of the tractions at most. Take more beads, or a softer gel.");
-    if (last && last->left_out > kBeyondLinear) warnings.push_back(sentence_of_strain(E, last->left_out));
+    double most = 0;
+    for (const double density : asked.densities)
+      most = std::max(most, expected_of(grid, {E, density, asked.noise_um.front()}, SpaceQuantity::force).degrees);
+    if (most < kFewNumbers) grid.warnings.push_back(report::sentence("plan.few-numbers", brief(E), brief(most)));
   }
-  return warnings;
 }
 
 }  // namespace
@@ -307,32 +296,26 @@ SpaceGrid grid_of(const SpaceScene& scene, const Asked& asked, const std::vector
     const auto k = foreseen.index_of_density(density);
     const spatial::Foreseen& f = foreseen.of(point);
     for (const SpaceQuantity quantity : {force, tangential_force, normal_force, total_force, net_force}) {
-      Errors errors = errors_of(scene, f, quantity);
+      const Errors errors = errors_of(scene, f, quantity);
       const bool is_of_cell = quantity == total_force || quantity == net_force;
       const double target_nN = is_of_cell ? asked.within * total_nN : asked.target_nN;
-      const double error_nN = numerics::median_in(errors.all_nN), beads_nN = numerics::median_in(errors.beads_nN);
-      grid.expected.push_back(
-          {.point = point,
-           .quantity = quantity,
-           .n = static_cast<int>(errors.all_nN.size()),
-           .standard_error_nN = error_nN,
-           .from_beads_nN = beads_nN,
-           .from_background_nN = std::sqrt(std::max(0.0, error_nN * error_nN - beads_nN * beads_nN)),
-           .target_nN = target_nN,
-           .share_within = share_within(errors.all_nN, target_nN),
-           .smallest_seen_nN = kSeen * error_nN,
-           .resolution_um =
-               quantity == force ? std::optional(resolution_at_patches(scene, pools[k].problem, f)) : std::nullopt,
-           .least_distance_um =
-               quantity == force ? pairs.least_distance_um(asked.tension_nN, E, k, noise_um) : std::nullopt,
-           .degrees = f.degrees,
-           .largest_displacement_um = own[k].largest_um * scene.gel.youngs_modulus_kPa / E,
-           .left_out = choice::left_out_in_gel(with_modulus(scene.gel, E), own[k].traction_kPa)});
+      SpaceExpected& e =
+          grid.expected.emplace_back(expected_by(point, quantity, errors.all_nN, errors.beads_nN, target_nN));
+      e.from_background_nN = std::sqrt(std::max(0.0, std::pow(e.standard_error_nN, 2) - std::pow(e.from_beads_nN, 2)));
+      if (quantity == force) {
+        e.resolution_um = resolution_at_patches(scene, pools[k].problem, f);
+        e.least_distance_um = pairs.least_distance_um(asked.tension_nN, E, k, noise_um);
+      }
+      e.degrees = f.degrees;
+      e.largest_displacement_um = own[k].largest_um * scene.gel.youngs_modulus_kPa / E;
+      e.left_out = choice::left_out_in_gel(with_modulus(scene.gel, E), own[k].traction_kPa);
     }
   }
   for (const double E : asked.youngs_modulus_kPa)
     for (const double noise_um : asked.noise_um) grid.needed.push_back(needed_of(scene, asked, foreseen, E, noise_um));
-  grid.warnings = warnings_of(scene, asked, grid);
+  grid.warnings = scene.warnings;
+  for (std::string& warning : warnings_of(asked, grid, force)) grid.warnings.push_back(std::move(warning));
+  add_few_numbers(asked, grid);
   return grid;
 }
 
