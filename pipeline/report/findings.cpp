@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <regex>
 
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/stage_state.h"
@@ -183,13 +182,6 @@ std::vector<std::string> on_outputs(const Provenance& provenance) {
   return sentences;
 }
 
-/// Findings are written for terminals too, in plain characters: a page has µ and ±.
-std::string printed(const std::string& text) {
-  static const std::regex length(R"(\bum\b)"), area(R"(\bum2\b)"), plus_minus(R"(\+-)");
-  const std::string lengths = std::regex_replace(text, length, "µm"), all = std::regex_replace(lengths, area, "µm²");
-  return html_escaped(std::regex_replace(all, plus_minus, "±"));
-}
-
 std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {
   return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, printed(text), more);
 }
@@ -197,10 +189,11 @@ std::string item(const char* kind, const char* mark, const std::string& text, co
 constexpr const char* kPage = "docs/findings.md";
 
 /// The remedy in sight and the page's name; number, threshold and its reason unfold. A report goes where the
-/// pages do not: it names them, and links to none.
-std::string details_of(const Finding& f) {
+/// pages do not: it names them, and links to none. @param next  has the remedy, too, if it is the same
+std::string details_of(const Finding& f, const Finding* next) {
   std::string html;
-  if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + printed(f.remedy);
+  const bool is_repeated = next && next->remedy == f.remedy && next->severity == f.severity;
+  if (is_open(f) && !f.remedy.empty() && !is_repeated) html += "<br><i>What to do:</i> " + printed(f.remedy);
   if (f.number && f.threshold) {
     html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", html_escaped(f.id),
                         printed(f.number_is), readable(*f.number), readable(*f.threshold), printed(f.reason),
@@ -209,27 +202,30 @@ std::string details_of(const Finding& f) {
   return html + (is_open(f) ? fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, html_escaped(f.id)) : "");
 }
 
-std::string item_of(const Finding& f) {
-  switch (f.severity) {
-    case Severity::note:
-      return item("fact", "<b>Note:</b> ", f.text, details_of(f));
-    case Severity::caution:
-      return item("caution", "<b>Caution:</b> ", f.text, details_of(f));
-    case Severity::bad:
-      return item("bad", "<b>Distrust:</b> ", f.text, details_of(f));
-  }
-  return {};
-}
+/// By Severity: the item's class and its mark.
+constexpr std::pair<const char*, const char*> kItems[] = {
+    {"fact", "<b>Note:</b> "}, {"caution", "<b>Caution:</b> "}, {"bad", "<b>Distrust:</b> "}};
 
 /// Open ones, the gravest first, and notes, each as the stages gave them.
 struct Items {
   std::string open, notes;
 };
-Items items_of(std::vector<Finding> findings) {
+void add_findings(std::vector<Finding> findings, Items& items) {
   std::ranges::stable_sort(findings, std::ranges::greater(), &Finding::severity);
-  Items items;
-  for (const Finding& f : findings) (is_open(f) ? items.open : items.notes) += item_of(f);
-  return items;
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    const Finding& f = findings[i];
+    const auto& [kind, mark] = kItems[static_cast<std::size_t>(f.severity)];
+    (is_open(f) ? items.open : items.notes) +=
+        item(kind, mark, f.text, details_of(f, i + 1 < findings.size() ? &findings[i + 1] : nullptr));
+  }
+}
+
+/// @param may_be_sound  else a tick would say what nobody asked
+std::string list_with(const std::vector<std::string>& facts, Items items, bool may_be_sound) {
+  std::string html = "<ul class=\"findings\">\n";
+  for (const std::string& fact : facts) html += item("fact", "", fact);
+  if (items.open.empty() && may_be_sound) items.open = item("good", "<b>✓</b> ", sentence("cell.nothing-open"));
+  return html + items.open + items.notes + "</ul>\n";
 }
 
 /// Stages that compare a model with the beads.
@@ -257,29 +253,23 @@ std::vector<std::string> facts_of(const CellResults& results) {
 }
 
 std::string findings_section(const std::vector<std::string>& facts, const Provenance& provenance) {
-  std::string html = "<ul class=\"findings\">\n", open;
-  for (const std::string& fact : facts) html += item("fact", "", fact);
-  for (const StageLine& stage : provenance.stages) {
-    if (!stage.converged) open += item("bad", "<b>Distrust:</b> ", sentence("cell.not-converged", stage.name));
-  }
-  auto [of_findings, notes] = items_of(provenance.findings);
-  open += of_findings;
+  Items items;
+  for (const StageLine& stage : provenance.stages)
+    if (!stage.converged) items.open += item("bad", "<b>Distrust:</b> ", sentence("cell.not-converged", stage.name));
+  add_findings(provenance.findings, items);
   if (const auto& accuracy = provenance.accuracy) {
-    (accuracy->is_met ? notes : open) +=
-        item(accuracy->is_met ? "fact" : "caution", accuracy->is_met ? "" : "<b>Caution:</b> ",
-             "Verified by the error budget: " + accuracy->verdict + ".");
+    const std::string text = "Verified by the error budget: " + accuracy->verdict + ".";
+    (accuracy->is_met ? items.notes : items.open) +=
+        accuracy->is_met ? item("fact", "", text) : item("caution", "<b>Caution:</b> ", text);
   }
-  if (open.empty() && was_asked(provenance)) open = item("good", "<b>✓</b> ", sentence("cell.nothing-open"));
-  for (const std::string& sentence : on_outputs(provenance)) notes += item("fact", "", sentence);
-  return section("In short", html + open + notes + "</ul>\n");
+  for (const std::string& sentence : on_outputs(provenance)) items.notes += item("fact", "", sentence);
+  return section("In short", list_with(facts, std::move(items), was_asked(provenance)));
 }
 
 std::string list_of(const std::vector<std::string>& facts, const std::vector<Finding>& findings) {
-  std::string html = "<ul class=\"findings\">\n";
-  for (const std::string& fact : facts) html += item("fact", "", fact);
-  auto [open, notes] = items_of(findings);
-  if (open.empty()) open = item("good", "<b>✓</b> ", sentence("cell.nothing-open"));
-  return html + open + notes + "</ul>\n";
+  Items items;
+  add_findings(findings, items);
+  return list_with(facts, std::move(items), true);
 }
 
 }  // namespace mbtfm::report

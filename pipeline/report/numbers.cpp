@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/contract/listed.h"
+#include "pipeline/contract/with_error.h"
 
 namespace mbtfm::report {
 
@@ -37,12 +38,21 @@ std::string rounded(const std::optional<double>& value, std::optional<int> decim
 }
 
 std::string with_error(double value, std::optional<double> error) {
-  const std::optional<int> decimals = decimals_for(error);
-  return decimals ? rounded(value, decimals) + " ± " + rounded(*error, decimals) : readable(value);
+  if (!error || !(*error > 0)) return readable(value);
+  std::string text = mbtfm::with_error(value, *error);
+  return with_minus(text.replace(text.find("+-"), 2, "±"));
 }
 
 std::string with_error(double value, std::optional<double> error, const char* unit) {
   return with_error(value, error) + " " + unit;
+}
+
+WithInterval with_interval(double value, double low, double high) {
+  if (!(high > low)) return {readable(value), readable(low) + " to " + readable(high)};
+  const auto shown = [decimals = decimals_for((high - low) / 2)](double v) {
+    return with_minus(fmt::format("{:.{}f}", v, decimals));
+  };
+  return {shown(value), shown(low) + " to " + shown(high)};
 }
 
 std::string text_of_figure(const Value& value) {

@@ -21,10 +21,16 @@ std::string rounded(double value, std::optional<int> decimals);
 /// "–" for none.
 std::string rounded(const std::optional<double>& value, std::optional<int> decimals);
 
-/// "412 ± 21 nN"; without an error above 0 "412 nN".
+/// Both to two digits of the error: "412 ± 21 nN", "171.3 ± 4.4 nN"; without an error above 0 "412 nN".
 std::string with_error(double value, std::optional<double> error, const char* unit);
 /// The same without a unit.
 std::string with_error(double value, std::optional<double> error);
+
+/// A number and the ends of its interval, to two digits of half the interval: "3.3", "2.2 to 5.0".
+struct WithInterval {
+  std::string value, interval;
+};
+WithInterval with_interval(double value, double low, double high);
 
 /// Of a figure: a number as above, a list with commas.
 std::string text_of_figure(const Value& value);

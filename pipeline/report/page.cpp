@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cctype>
+#include <regex>
 
 #include "pipeline/contract/version.h"
 #include "pipeline/files/base64.h"
@@ -77,6 +78,12 @@ std::string html_of_pairs(const std::string& caption, const std::vector<std::pai
 
 std::string data_address(const Path& picture, const char* type) {
   return fmt::format("data:{};base64,{}", type, files::base64(files::read_text(picture)));
+}
+
+std::string printed(const std::string& text) {
+  static const std::regex length(R"(\bum\b)"), area(R"(\bum2\b)"), plus_minus(R"(\+-)");
+  const std::string lengths = std::regex_replace(text, length, "µm"), all = std::regex_replace(lengths, area, "µm²");
+  return html_escaped(std::regex_replace(all, plus_minus, "±"));
 }
 
 std::string capitalised(std::string text) {

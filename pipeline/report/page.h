@@ -42,6 +42,9 @@ std::string html_of_pairs(const std::string& caption, const std::vector<std::pai
 /// The bytes of a picture as an address, for a page that must stand alone. @param type  "image/jpeg"
 std::string data_address(const Path& picture, const char* type);
 
+/// As HTML what programs write for terminals, too, in plain characters: a page has µ and ±.
+std::string printed(const std::string& text);
+
 /// A sentence begins so: "Control: ventral fibres".
 std::string capitalised(std::string text);
 

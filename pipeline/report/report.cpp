@@ -39,7 +39,7 @@ std::string effects_table(const Provenance& provenance, bool is_on) {
   if (is_on) table.columns.push_back(number("seconds"));
   for (const EffectLine& effect : provenance.effects) {
     if (effect.is_on != is_on) continue;
-    table.rows.push_back({html_escaped(effect.name), html_escaped(effect.stage), html_escaped(effect.why)});
+    table.rows.push_back({html_escaped(effect.name), html_escaped(effect.stage), printed(effect.why)});
     if (is_on) table.rows.back().push_back(effect.seconds);
   }
   if (table.rows.empty()) return {};
@@ -52,7 +52,7 @@ std::string provenance_section(const Provenance& provenance, const std::string& 
   Table stages{"Stages", {"stage", "state", "result", number("seconds"), number("memory (MB)"), "version"}};
   for (const StageLine& stage : provenance.stages) {
     stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
-                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           printed(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
                            stage.peak_memory_MB, html_escaped(stage.version)});
   }
   std::string html = html_of(stages);

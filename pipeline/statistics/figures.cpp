@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "pipeline/contract/counted.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/texts.h"
 #include "pipeline/statistics/drawing.h"
 #include "pipeline/statistics/study_files.h"
@@ -195,8 +196,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
         continue;
       }
       chart.curve({{0, 0}, {x_end, c->line->slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
-      std::string text = prefix_of(c->condition) + readable(c->line->slope);
-      if (c->line->slope_error) text += fmt::format(" ± {:.2g}", *c->line->slope_error);
+      std::string text = prefix_of(c->condition) + report::with_error(c->line->slope, c->line->slope_error);
       if (c->line->correlation) text += ", r = " + readable(std::round(100 * *c->line->correlation) / 100);
       chart.key(text + fmt::format(", n = {}", c->x.size()), colour);
     }

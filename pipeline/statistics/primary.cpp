@@ -5,15 +5,13 @@
 #include <cmath>
 #include <map>
 
-#include "pipeline/charts/chart.h"
 #include "pipeline/contract/counted.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/statistics/analysis.h"
 #include "pipeline/statistics/rank_tests.h"
 
 namespace mbtfm::statistics {
-
-using charts::readable;
 
 namespace {
 
@@ -93,13 +91,13 @@ std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p =
 
 std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
   const Contrast& c = d.difference;
-  std::string text = fmt::format("{}, {} minus {}: {} {}", primary.measure, d.condition, primary.reference,
-                                 readable(c.estimate), primary.unit);
+  const auto [estimate, interval] = report::with_interval(c.estimate, c.low, c.high);
+  std::string text =
+      fmt::format("{}, {} minus {}: {} {}", primary.measure, d.condition, primary.reference, estimate, primary.unit);
   if (primary.reference_mean > 0)
     text +=
         fmt::format(" ({}{:.0f} %)", c.estimate < 0 ? "−" : "+", 100 * std::abs(c.estimate) / primary.reference_mean);
-  text +=
-      fmt::format(" [95 % CI {} to {} {}], {}; ", readable(c.low), readable(c.high), primary.unit, p_text(d.p_holm));
+  text += fmt::format(" [95 % CI {} {}], {}; ", interval, primary.unit, p_text(d.p_holm));
   if (d.replicates > 0) text += counted(d.replicates, "replicates") + ", ";
   return text + fmt::format("{} and {} {}", d.cells, d.cells_before, primary.cells);
 }

@@ -223,7 +223,7 @@ std::vector<Observation> Sample::of_group(int condition, int kind) const {
   return own;
 }
 
-std::string Sample::amount(double value) const { return charts::readable(value) + (unit.empty() ? "" : " " + unit); }
+std::string Sample::amount(double value) const { return amount(charts::readable(value)); }
 
 CellKind Sample::of_cells() const {
   using enum CellKind;

@@ -44,6 +44,7 @@ struct Sample {
   int group_of(int condition, int kind) const { return condition * n_kinds() + kind; }
   std::vector<Observation> of_group(int condition, int kind) const;
   /// "4.1 nN"
+  std::string amount(const std::string& value) const { return unit.empty() ? value : value + " " + unit; }
   std::string amount(double value) const;
   /// "tension (nN)"
   std::string label() const { return unit.empty() ? name : name + " (" + unit + ")"; }

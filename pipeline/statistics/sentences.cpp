@@ -4,6 +4,7 @@
 #include <set>
 
 #include "pipeline/contract/counted.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/texts.h"
 #include "pipeline/statistics/analysis.h"
@@ -39,10 +40,12 @@ std::vector<std::string> means(const Measure& m) {
   if (m.summaries.empty()) return {fmt::format("No {} of {} is known.", sample.name, name_of(sample.each))};
   std::vector<std::string> list;
   for (const Summary& s : m.summaries) {
+    const report::WithInterval mean = s.model ? report::with_interval(s.model->estimate, s.model->low, s.model->high)
+                                              : report::WithInterval{readable(s.plain.mean), {}};
     std::string text =
         fmt::format("{}the {}{} of {} is {}", prefix_of(s.condition), sample.name.starts_with("mean") ? "" : "mean ",
-                    sample.name, plural_of(sample, s.kind), sample.amount(s.model ? s.model->estimate : s.plain.mean));
-    if (s.model) text += fmt::format(" [95 % CI {} to {}]", readable(s.model->low), readable(s.model->high));
+                    sample.name, plural_of(sample, s.kind), sample.amount(mean.value));
+    if (s.model) text += " [95 % CI " + mean.interval + "]";
     text += " (" + counted(s.n_cells, sample.cells_name());
     if (!sample.is_one_a_cell()) text += ", " + counted(s.n, counted_name(sample));
     if (!s.model) text += s.n_cells == 1 ? ": no interval" : ", no interval: " + m.obstacle;
@@ -99,9 +102,9 @@ void add_differences(const Measure& m, Findings& findings) {
             ? fmt::format("{}{} of {} minus that of {}", prefix_of(c.within), m.sample.name,
                           plural_of(m.sample, c.group_a), plural_of(m.sample, c.group_b))
             : fmt::format("{} of {}, {} minus {}", m.sample.name, plural_of(m.sample, c.within), c.group_a, c.group_b);
-    text += fmt::format(": {} [95 % CI {} to {}] (mixed model, t({}) = {}, {}", m.sample.amount(c.effect),
-                        readable(c.interval->low), readable(c.interval->high), readable(*c.degrees),
-                        readable(c.statistic), p_text(*c.p_holm));
+    const auto [effect, interval] = report::with_interval(c.effect, c.interval->low, c.interval->high);
+    text += fmt::format(": {} [95 % CI {}] (mixed model, t({}) = {}, {}", m.sample.amount(effect), interval,
+                        readable(*c.degrees), readable(c.statistic), p_text(*c.p_holm));
     const Comparison* ranks = same_pair(m, c, is_one_a_cell ? Test::mann_whitney : Test::clustered_rank_sum);
     if (ranks != nullptr)
       text +=
@@ -130,9 +133,9 @@ std::vector<std::string> lines(const Analysis& analysis) {
   std::vector<std::string> list;
   for (const Correlation& c : analysis.correlations) {
     if (c.force != "total_force_nN" || !c.line) continue;
-    const std::string error = c.line->slope_error ? " ± " + readable(*c.line->slope_error) : "";
-    std::string text = report::sentence("study.force-for-size", prefix_of(c.condition), readable(c.line->slope), error,
-                                        c.size_unit, counted(std::ssize(c.x), "cells"));
+    std::string text = report::sentence("study.force-for-size", prefix_of(c.condition),
+                                        report::with_error(c.line->slope, c.line->slope_error), c.size_unit,
+                                        counted(std::ssize(c.x), "cells"));
     if (c.line->correlation) text += ", r = " + readable(*c.line->correlation);
     list.push_back(begun(c.condition, text + ")."));
   }
