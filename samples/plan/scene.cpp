@@ -7,7 +7,6 @@
 
 #include "continuum/sheet/parameters.h"
 #include "mbtfm/spatial/stage.h"
-#include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
