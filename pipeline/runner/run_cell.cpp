@@ -92,7 +92,7 @@ class CellRun {
         settings_(read_settings(cell_ / "cell.toml", of_.stages, given_)),
         hashes_(cell_) {
     for (const Setting& setting : options.set) {
-      if (setting.table == "segment" && setting.key == "cell" && setting.value == "0")
+      if (setting == Setting{"segment", "cell", "0"})
         throw UsageError(
             "--set segment.cell=0: each cell of a picture gets a folder and a cell.toml of its own; write cell = 0 "
             "below [segment] in " +

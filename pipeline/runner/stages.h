@@ -30,6 +30,7 @@ struct PathArgument {
 /// A key of cell.toml and its value, as a flag spells it.
 struct Setting {
   std::string table, key, value;
+  bool operator==(const Setting&) const = default;
 };
 
 struct Stage {
