@@ -36,6 +36,7 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
       const double truth = scene.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm();
       const double error = norm(forces[a].force_nN) - truth;
       stated += std::pow(error / *forces[a].sigma_nN, 2);
+      EXPECT_GT(*forces[a].sigma_nN, fit.forces.magnitudes[a].noise) << "the meshes differ, too";
     }
     left += (adhesion_forces_nN(fit) - scene.forces_nN).squaredNorm();
     of_network += (fit.forces.nN - scene.forces_nN).squaredNorm();

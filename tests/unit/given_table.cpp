@@ -397,6 +397,9 @@ TEST(GivenTable, y_that_falls_from_row_to_row_points_up_and_the_user_is_asked) {
   expect_same(read(text, said), upwards(rows));
   said.y_axis = VerticalAxis::up;
   expect_same(read(text, said), rows);
+  // windows that end above the lower border
+  const Rows upper(rows.begin(), rows.begin() + 48);
+  expect_same(read("x [px];y [px];u [px];v [px]\n" + lines_of(upwards(upper), ";"), said), upper);
   // from an origin in the picture's middle
   Rows about_middle = upwards(rows);
   for (auto& row : about_middle) row[0] -= 64, row[1] -= 64;
