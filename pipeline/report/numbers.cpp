@@ -48,8 +48,9 @@ std::string with_error(double value, std::optional<double> error, const char* un
 }
 
 WithInterval with_interval(double value, double low, double high) {
-  if (!(high > low)) return {readable(value), readable(low) + " to " + readable(high)};
-  const auto shown = [decimals = decimals_for((high - low) / 2)](double v) {
+  const double half = (high - low) / 2;
+  if (!(half > 0) || std::isinf(half)) return {readable(value), readable(low) + " to " + readable(high)};
+  const auto shown = [decimals = decimals_for(half)](double v) {
     return with_minus(fmt::format("{:.{}f}", v, decimals));
   };
   return {shown(value), shown(low) + " to " + shown(high)};

@@ -580,37 +580,37 @@ TEST(Batch, a_folder_without_cells_is_an_error) {
 }
 
 TEST(Told, is_one_line_for_the_stage_and_names_effects_that_are_on_unasked) {
-  StageResult told{.stage = "fit",
-                   .status = {StageState::must_run, "not run yet"},
-                   .was_run = true,
-                   .seconds = 2.34,
-                   .report = StageReport{}};
-  told.report->summary = "20 tensions";
+  StageResult result{.stage = "fit",
+                     .status = {StageState::must_run, "not run yet"},
+                     .was_run = true,
+                     .seconds = 2.34,
+                     .report = StageReport{}};
+  result.report->summary = "20 tensions";
   const auto effect = [](EffectKind kind, Switch setting, bool is_on) {
     return Effect{.kind = kind, .setting = setting, .is_on = is_on, .why = "because"};
   };
-  told.report->effects = {effect(EffectKind::finite_thickness, Switch::automatic, true),
-                          effect(EffectKind::robust_loss, Switch::on, true),
-                          effect(EffectKind::large_strain, Switch::automatic, false)};
-  EXPECT_EQ(text_of(told, Detail::brief),
+  result.report->effects = {effect(EffectKind::finite_thickness, Switch::automatic, true),
+                            effect(EffectKind::robust_loss, Switch::on, true),
+                            effect(EffectKind::large_strain, Switch::automatic, false)};
+  EXPECT_EQ(text_of(result, Detail::brief),
             "fit      20 tensions (2.3 s)\n  on as your data call for it: finite thickness");
-  EXPECT_TRUE(has_words(text_of(told, Detail::all), "finite thickness", "robust loss", "large strain"));
-  told.report->effects.clear();
-  told.status.why = "its parameters have changed";
-  EXPECT_EQ(text_of(told, Detail::brief), "fit      20 tensions (2.3 s; its parameters have changed)");
+  EXPECT_TRUE(has_words(text_of(result, Detail::all), "finite thickness", "robust loss", "large strain"));
+  result.report->effects.clear();
+  result.status.why = "its parameters have changed";
+  EXPECT_EQ(text_of(result, Detail::brief), "fit      20 tensions (2.3 s; its parameters have changed)");
 }
 
 TEST(Told, events_are_json_objects_a_line) {
-  StageResult told{
+  StageResult result{
       .stage = "track", .status = {StageState::must_run, "not run yet"}, .was_run = true, .report = StageReport{}};
-  told.report->summary = "two\nlines and \"quotes\"";
-  told.report->findings = {{.id = "nothing-moves", .severity = Severity::caution, .text = "Nothing moves."}};
-  std::istringstream lines(events_of(told));
+  result.report->summary = "two\nlines and \"quotes\"";
+  result.report->findings = {{.id = "nothing-moves", .severity = Severity::caution, .text = "Nothing moves."}};
+  std::istringstream lines(events_of(result));
   std::vector<nlohmann::json> events;
   for (std::string line; std::getline(lines, line);) events.push_back(nlohmann::json::parse(line));
   ASSERT_EQ(events.size(), 2u);
   EXPECT_EQ(events[0]["event"], "stage");
-  EXPECT_EQ(events[0]["summary"], told.report->summary);
+  EXPECT_EQ(events[0]["summary"], result.report->summary);
   EXPECT_EQ(events[1]["event"], "finding");
   EXPECT_EQ(events[1]["stage"], "track");
 }
