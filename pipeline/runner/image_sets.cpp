@@ -185,6 +185,11 @@ fs::path make_cell_of_picture(const fs::path& folder, int n) {
   return cell;
 }
 
+bool is_made_for_picture(const fs::path& cell) {
+  const fs::path file = cell / "cell.toml";
+  return files::is_file(file) && files::read_text(file).starts_with(kMade);
+}
+
 int n_cells_in_picture(const fs::path& cell) {
   const StageReport report = stage::read_report(cell / "1_segment/record.json");
   const auto n = std::ranges::find(report.figures, "n_cells_in_image", [](const auto& f) { return f.first; });

@@ -35,6 +35,9 @@ bool asks_for_all_cells(const fs::path& folder);
 /// @throws UsageError if an outline or fibres are drawn by hand, which belong to one cell
 fs::path make_cell_of_picture(const fs::path& folder, int n);
 
+/// Whether the folder is one that make_cell_of_picture made.
+bool is_made_for_picture(const fs::path& cell);
+
 /// How many cells the picture shows, as the segmentation of this one has it. @throws InputError if there is none
 int n_cells_in_picture(const fs::path& cell);
 

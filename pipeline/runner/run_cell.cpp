@@ -10,6 +10,7 @@
 #include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/cell_stages.h"
+#include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
 #include "pipeline/stage/effects.h"
@@ -92,11 +93,12 @@ class CellRun {
         settings_(read_settings(cell_ / "cell.toml", of_.stages, given_)),
         hashes_(cell_) {
     for (const Setting& setting : options.set) {
-      if (setting == Setting{"segment", "cell", "0"})
-        throw UsageError(
-            "--set segment.cell=0: each cell of a picture gets a folder and a cell.toml of its own; write cell = 0 "
-            "below [segment] in " +
-            (cell_ / "cell.toml").string());
+      const bool is_made = is_made_for_picture(cell_);
+      if (setting.table == "segment" && setting.key == "cell" && (is_made || setting.value == "0"))
+        throw UsageError("--set segment.cell=" + setting.value +
+                         ": each cell of a picture gets a folder and a cell.toml of its own; write cell = " +
+                         setting.value + " below [segment] in " +
+                         (is_made ? cell_ / "../cell.toml" : cell_ / "cell.toml").lexically_normal().string());
       if (std::ranges::any_of(of_.stages, [&](const Stage& stage) { return !flags_of(stage, {setting}).empty(); }))
         continue;
       const std::string meant = stage::did_you_mean(stage::effect_keys(), setting.key);

@@ -118,6 +118,8 @@ TEST(AllCells, have_a_folder_each_and_the_force_that_one_alone_has) {
   }
   EXPECT_LT(least, 3) << "standard errors of the total force";
   EXPECT_FALSE(files::is_file(cell + "/cell_3/cell.toml"));
+  const std::string refused = output_of("mbtfm run --set segment.cell=2 " + cell, 2);
+  EXPECT_TRUE(has_words(refused, "write cell = 2 below [segment] in " + cell + "/cell.toml")) << refused;
 }
 
 TEST(AllCells, leave_a_cell_of_the_users_own_as_it_is) {
