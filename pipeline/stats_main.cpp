@@ -62,12 +62,13 @@ StageReport statistics(const StudyParameters& parameters, stage::StageContext& c
   files::write_text(context.output("out", "review.html"), review_html(study, context.outputs_.at("out")));
   files::write_text(context.output("out", "study.R"), std::string(kStudyScript));
   StageReport report;
-  if (analysis.has_fibres)
-    report.summary = counted(n_of_kind(study, CellKind::plane), "cells") + ", " +
-                     counted(std::ssize(analysis.tensions().sample.values), "tensions") + "; ";
-  if (const int n = n_of_kind(study, CellKind::sheet); n > 0) report.summary += counted(n, "sheets") + "; ";
-  if (const int n = n_of_kind(study, CellKind::space); n > 0)
-    report.summary += counted(n, "cell in space", "cells in space") + "; ";
+  for (const CellKind kind : kKindsOfCells) {
+    const int n = n_of_kind(study, kind);
+    if (n == 0) continue;
+    report.summary += counted(n, traits_of(kind).one, traits_of(kind).many);
+    if (has_fibres(kind)) report.summary += ", " + counted(std::ssize(analysis.tensions().sample.values), "tensions");
+    report.summary += "; ";
+  }
   report.summary += counted(std::ssize(study.left_out), "cells") + " left out, " +
                     counted(std::ssize(analysis.warnings), "warnings") + ": see report.html";
   return report;

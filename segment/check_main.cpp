@@ -27,15 +27,15 @@ survey::Survey survey_of(const fs::path& cell, survey::CellImages& images) {
   const auto needed = [&](const char* key) { return runner::resolve_image(cell, names, key); };
   const auto if_there = [&](const char* key) { return runner::resolve_optional_image(cell, names, key); };
   survey::CellFiles files{.toml = cell / "cell.toml"};
-  if (kind != CellKind::space) {
+  if (!is_in_space(kind)) {
     files.adhesion = if_there("adhesion");
-    files.actin = kind == CellKind::sheet ? if_there("actin") : needed("actin");  // a sheet's outline may be a mask
+    files.actin = is_sheet(kind) ? if_there("actin") : needed("actin");  // a sheet's outline may be a mask
   }
-  if (kind != CellKind::space && !runner::name_of_image(names, "displacement").empty())
+  if (!is_in_space(kind) && !runner::name_of_image(names, "displacement").empty())
     files.displacement = needed("displacement");
   else
     files.beads_stressed = needed("beads_stressed"), files.beads_relaxed = needed("beads_relaxed");
-  if (kind == CellKind::space) return survey::survey_in_space(files);
+  if (is_in_space(kind)) return survey::survey_in_space(files);
   images = survey::read_images(files);
   return survey::survey(images, 1);
 }

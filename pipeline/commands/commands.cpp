@@ -66,11 +66,11 @@ runner::RunOptions run_options(const CommandLine& line) {
 /// @throws UsageError where no error budget of tensions will tell what was reached
 void expect_tensions(const fs::path& cell) {
   const runner::CellStages of = runner::stages_of(cell, runner::read_image_names(cell));
-  if (of.kind == CellKind::plane) return;
+  if (has_fibres(of.kind)) return;
   throw UsageError(std::string("--accuracy: is an error of fibre tensions, and this cell is ") +
-                   (of.kind == CellKind::sheet ? "a sheet (" : "in space (") + of.why +
+                   (is_sheet(of.kind) ? "a sheet (" : "in space (") + of.why +
                    "): leave it out; its report states the errors" +
-                   (of.kind == CellKind::space ? ", and --preset sets how much is computed" : ""));
+                   (is_in_space(of.kind) ? ", and --preset sets how much is computed" : ""));
 }
 
 /// Presets are tried without a report; the last one is then up to date, and reported with the accuracy it reached.

@@ -116,8 +116,8 @@ std::vector<Rung> ladder_in_space(Extent extent, double spacing_um) {
 }
 
 std::vector<std::string> groups_of(CellKind kind) {
-  if (kind == CellKind::space) return {"tractions", "gel", "method", "data, presets, threads"};
-  return {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"};
+  if (has_fibres(kind)) return {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"};
+  return {"tractions", "gel", "method", "data, presets, threads"};
 }
 
 std::string group_of(const std::string& knob, CellKind kind) {
@@ -131,7 +131,7 @@ std::string group_of(const std::string& knob, CellKind kind) {
        {"beads", "with_axial", "image_scale", "robust_loss", "preset", "threads", "bootstrap"}}};
   for (const auto& [group, knobs] : kKnobs)
     if (knobs.contains(knob)) return group;
-  return kind == CellKind::space ? "method" : "equilibrium and fit";
+  return has_fibres(kind) ? "equilibrium and fit" : "method";
 }
 
 }  // namespace mbtfm::cost

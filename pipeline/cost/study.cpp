@@ -79,13 +79,13 @@ class Scratch {
     files::check_cell_folder(cell);
     const runner::CellStages of = runner::stages_of(cell, images_);
     kind_ = of.kind;
-    if (kind_ == CellKind::sheet)
+    if (is_sheet(kind_))
       throw InputError(cell.string(),
                        "a cell with fibres on a flat gel, or one in space: the knobs that are turned are theirs",
                        "a sheet (" + of.why + ")",
                        "its report lists how long each stage took; sheet.mesh_um sets how many triangles there are");
     stages_ = runner::stages();
-    if (kind_ == CellKind::space)
+    if (!has_fibres(kind_))
       stages_ = {of.stages.back()};  // traction
     else
       has_images_ = has_all_images(cell, images_);
@@ -129,7 +129,7 @@ class Scratch {
 
   Answer answer() const {
     Answer answer;
-    if (kind_ == CellKind::space) {
+    if (!has_fibres(kind_)) {
       answer.map = report::map_of(report::read_space_results(folder_));
       answer.total_force_nN = answer.map->total_force_nN;
       return answer;
@@ -144,19 +144,19 @@ class Scratch {
  private:
   /// Without which the cell was not run.
   std::vector<std::string> needed() const {
-    if (kind_ == CellKind::space)
+    if (is_in_space(kind_))
       return {report::kBeadsInSpace, "3_surface/surface.vtp", "4_traction/traction.json", "cell.toml"};
     return {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"};
   }
 
   void take_from_cell() const {
     std::vector<std::string> parts = {"1_segment", "2_track"};
-    if (kind_ == CellKind::space) parts.emplace_back("3_surface");
+    if (is_in_space(kind_)) parts.emplace_back("3_surface");
     for (const std::string& part : parts) {
       fs::remove_all(folder_ / part);
       if (files::is_folder(cell_ / part)) copy_files(cell_ / part, folder_ / part);
     }
-    if (kind_ == CellKind::space) fs::create_directories(folder_ / "4_traction");
+    if (!has_fibres(kind_)) fs::create_directories(folder_ / "4_traction");
   }
 
   /// Every so-manieth bead, so that they stay evenly spread in whatever order they come.
@@ -173,7 +173,7 @@ class Scratch {
       }
       return some;
     };
-    if (kind_ == CellKind::space) {
+    if (is_in_space(kind_)) {
       const fs::path file = folder_ / report::kBeadsInSpace;
       files::write_displacement_in_space(file, some_of(files::read_displacement_in_space(file)));
     } else {
@@ -207,7 +207,7 @@ class Scratch {
   const StudyOptions& options_;
   fs::path cell_, folder_;
   runner::ImageNames images_;
-  CellKind kind_ = CellKind::plane;
+  CellKind kind_ = {};
   std::vector<runner::Stage> stages_;  ///< that are run
   bool has_images_ = false;
   Run of_images_;  ///< segmentation and tracking as the cell has them
@@ -233,7 +233,7 @@ void compare(Measurement& m, const Answer& answer, const Answer& reference) {
 
 /// The finest that the ladder's knobs allow, all at once, within reason.
 Rung finest(CellKind kind, double spacing_um) {
-  if (kind == CellKind::space) {
+  if (!has_fibres(kind)) {
     constexpr double kFinest = 0.7;
     return {.knob = "reference",
             .value = "tractions " + brief(kFinest * spacing_um) + " um apart, gel to 0.5 %",
@@ -248,7 +248,7 @@ Rung finest(CellKind kind, double spacing_um) {
 
 /// True tensions by the segmentation's fibre.
 Answer truth_of(const fs::path& cell, CellKind kind) {
-  if (kind == CellKind::space) {
+  if (!has_fibres(kind)) {
     const report::SpaceMap map = report::true_space_map(cell);
     return {.tensions_nN = {}, .total_force_nN = map.total_force_nN, .map = map};
   }
@@ -289,19 +289,19 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
     if (options.say) options.say(text);
   };
   Scratch scratch(cell, options);
-  const bool is_in_space = scratch.kind() == CellKind::space;
+  const bool of_fibres = has_fibres(scratch.kind());
   Study study{.kind = scratch.kind(), .reference = "the truth", .has_images = scratch.has_images()};
   const double spacing_um =
-      is_in_space ? files::JsonRecord(cell / "4_traction/traction.json", "a summary as mbtfm-traction writes it")
-                        .at("spacing_x_um")
-                        .number()
-                  : 0;
-  for (Rung& rung : is_in_space ? ladder_in_space(options.extent, spacing_um) : ladder(options.extent))
+      of_fibres ? 0
+                : files::JsonRecord(cell / "4_traction/traction.json", "a summary as mbtfm-traction writes it")
+                      .at("spacing_x_um")
+                      .number();
+  for (Rung& rung : of_fibres ? ladder(options.extent) : ladder_in_space(options.extent, spacing_um))
     if (scratch.has_images() || rung.knob == kPreset || !needs_images(rung))
       study.measurements.push_back({.rung = std::move(rung)});
   std::vector<std::vector<Run>> runs(study.measurements.size());
   std::optional<Answer> finest_answer;
-  if (!(is_in_space ? report::has_space_truth(cell) : report::has_truth(cell))) {
+  if (!(of_fibres ? report::has_truth(cell) : report::has_space_truth(cell))) {
     const Rung rung = finest(scratch.kind(), spacing_um);
     study.reference = rung.value;
     say("reference: " + study.reference);
@@ -321,7 +321,7 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
       const Answer answer = scratch.answer();
       compare(m, answer,
               finest_answer ? by_fibres_of(answer, *finest_answer) : truth_of(scratch.folder(), scratch.kind()));
-      if (!is_in_space) {
+      if (of_fibres) {
         const auto budget = files::read_fit_summary(scratch.folder() / "4_fit/fit.json").error_budget;
         if (budget && m.error > 0) m.stated_error = relative_error(*budget).total;
       }

@@ -63,7 +63,7 @@ struct Measurement {
 };
 
 struct Study {
-  CellKind kind = CellKind::plane;
+  CellKind kind = {};
   std::string reference;    ///< what errors are against: "the truth", or the finest rung
   bool has_images = false;  ///< times are those of all stages; else of network and fit, and nothing is segmented anew
   std::vector<Measurement> measurements = {};

@@ -23,27 +23,23 @@ bool is_measured(const Measurement& m) { return m.n_runs > 0 && m.failure.empty(
 std::string name_of(const Rung& rung) { return rung.value.empty() ? rung.knob : rung.knob + " = " + rung.value; }
 
 std::string stages_of(const Study& study) {
-  if (study.kind == CellKind::space) return "the stage traction";
+  if (!has_fibres(study.kind)) return "the stage traction";
   return study.has_images ? "all stages" : "network and fit";
 }
 
 /// What the error is of.
-const char* what_of(const Study& study) { return study.kind == CellKind::space ? "tractions" : "tensions"; }
+const char* what_of(const Study& study) { return has_fibres(study.kind) ? "tensions" : "tractions"; }
 
 struct CostRow {
-  CellKind kind = CellKind::plane;
+  CellKind kind = {};
   Measurement measured;
   bool is_on_front = false;
 };
 
 /// None where it was not measured.
 const Measurement* measured(const CostRow& row) { return is_measured(row.measured) ? &row.measured : nullptr; }
-const Measurement* measured_in_plane(const CostRow& row) {
-  return row.kind == CellKind::plane ? measured(row) : nullptr;
-}
-const Measurement* measured_in_space(const CostRow& row) {
-  return row.kind == CellKind::space ? measured(row) : nullptr;
-}
+const Measurement* measured_tensions(const CostRow& row) { return has_fibres(row.kind) ? measured(row) : nullptr; }
+const Measurement* measured_tractions(const CostRow& row) { return !has_fibres(row.kind) ? measured(row) : nullptr; }
 
 files::Table<CostRow> cost_table() {
   using Row = CostRow;
@@ -56,15 +52,15 @@ files::Table<CostRow> cost_table() {
                       {"cpu_seconds", member(measured, &Measurement::cpu_seconds), kResult},
                       {"peak_memory_MB", member(measured, &Measurement::peak_memory_MB), kResult},
                       {"n_runs", member(measured, &Measurement::n_runs)},
-                      {"tension_error", member(measured_in_plane, &Measurement::error), kResult},
+                      {"tension_error", member(measured_tensions, &Measurement::error), kResult},
                       {"force_error", member(measured, &Measurement::force_error), kResult},
-                      {"stated_tension_error", member(measured_in_plane, &Measurement::stated_error), kResult},
-                      {"n_fibres", member(measured_in_plane, &Measurement::n_fibres)},
+                      {"stated_tension_error", member(measured_tensions, &Measurement::stated_error), kResult},
+                      {"n_fibres", member(measured_tensions, &Measurement::n_fibres)},
                       {"is_on_front", &Row::is_on_front},
                       {"failure",
                        [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }},
-                      {"traction_error", member(measured_in_space, &Measurement::error), kResult},
-                      {"stated_traction_error", member(measured_in_space, &Measurement::stated_error), kResult}}};
+                      {"traction_error", member(measured_tractions, &Measurement::error), kResult},
+                      {"stated_traction_error", member(measured_tractions, &Measurement::stated_error), kResult}}};
 }
 
 void write_csv(const fs::path& file, const Study& study) {
@@ -189,7 +185,7 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
   for (const std::string& group : groups_of(study.kind)) list.push_back(chart_of(group, study, x, y));
   files::write_text(file, charts::svg_file(list, 2,
                                            {cell_name + ": |t − reference| / |reference| over the " +
-                                                (study.kind == CellKind::space ? "surface" : "fibres") +
+                                                (has_fibres(study.kind) ? "fibres" : "surface") +
                                                 "; reference: " + study.reference + ".",
                                             report::sentence("cost.front")}));
 }
@@ -240,32 +236,32 @@ std::string verdict(const std::vector<Measurement>& all) {
 
 std::string page(const Study& study, const std::string& cell_name) {
   const std::vector<Measurement>& all = study.measurements;
-  const bool is_in_space = study.kind == CellKind::space;
+  const bool of_fibres = has_fibres(study.kind);
   std::string text = fmt::format("## {}\n\n![error over time](cost.svg)\n\n", cell_name);
   if (!is_measured(all.front())) return text + "The run with the cell's own settings failed.\n";
   text += verdict(all) +
           fmt::format(" They err by {:.3g} against {} over {} and take {:.2g} s of processor time of {}.\n\n",
                       all.front().error, study.reference,
-                      is_in_space ? std::string("the surface") : std::to_string(all.front().n_fibres) + " fibres",
+                      of_fibres ? std::to_string(all.front().n_fibres) + " fibres" : std::string("the surface"),
                       all.front().cpu_seconds, stages_of(study));
   text += table_of_halving(all) + "\n";
   text += "Passed: the stages one after the other, whatever else the machine had to do.\n\n";
   text += fmt::format(
       "| choice | error of {} | stated | error of total force |{} processor (s) | passed (s) | memory (MB) |\n",
-      what_of(study), is_in_space ? "" : " fibres |");
-  text += is_in_space ? "|---|---|---|---|---|---|---|\n" : "|---|---|---|---|---|---|---|---|\n";
+      what_of(study), of_fibres ? " fibres |" : "");
+  text += of_fibres ? "|---|---|---|---|---|---|---|---|\n" : "|---|---|---|---|---|---|---|\n";
   const std::vector<int> front = front_of(all);
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Measurement& m = all[i];
     if (!is_measured(m)) {
       text += fmt::format("| {} | {} | | | | |{}\n", name_of(m.rung), m.n_runs == 0 ? "no time left" : m.failure,
-                          is_in_space ? " |" : " | |");
+                          of_fibres ? " | |" : " |");
       continue;
     }
     const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(i)) != front.end();
     text += fmt::format("| {}{} | {:.3g} | {:.3g} | {:.2g} % |{} {:.2g} | {:.2g} | {:.0f} |\n", name_of(m.rung),
                         is_on_front ? " (front)" : "", m.error, m.stated_error, 100 * m.force_error,
-                        is_in_space ? std::string() : fmt::format(" {} |", m.n_fibres), m.cpu_seconds, m.seconds,
+                        of_fibres ? fmt::format(" {} |", m.n_fibres) : std::string(), m.cpu_seconds, m.seconds,
                         m.peak_memory_MB);
   }
   return text;

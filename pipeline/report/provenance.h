@@ -34,7 +34,7 @@ struct WantedAccuracy {
 
 struct Provenance {
   std::string version;
-  CellKind kind = CellKind::plane;
+  CellKind kind = {};
   std::string kind_because;
   std::string started, ended, processor;  ///< of the run; empty: not known
   std::string preset;                     ///< empty: none was asked for

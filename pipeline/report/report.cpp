@@ -28,10 +28,11 @@ struct OfKind {
   Result (*result)(const Path& cell, const Path& report);
 };
 const OfKind& of(CellKind kind) {
-  static constexpr OfKind kPlane{"4_fit/fit.json", &kParaviewScript, page_in_plane, result_in_plane},
-      kSpace{"4_traction/traction.json", &kParaviewScriptInSpace, page_in_space, result_in_space},
-      kSheet{"3_sheet/sheet.json", nullptr, page_of_sheet, result_of_sheet};
-  return kind == CellKind::plane ? kPlane : kind == CellKind::space ? kSpace : kSheet;
+  static constexpr std::array<OfKind, 3> kAll = {
+      {{"4_fit/fit.json", &kParaviewScript, page_in_plane, result_in_plane},
+       {"4_traction/traction.json", &kParaviewScriptInSpace, page_in_space, result_in_space},
+       {"3_sheet/sheet.json", nullptr, page_of_sheet, result_of_sheet}}};
+  return kAll.at(static_cast<std::size_t>(kind));
 }
 
 std::string effects_table(const Provenance& provenance, bool is_on) {

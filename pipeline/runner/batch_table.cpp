@@ -56,7 +56,7 @@ struct BatchRow {
   std::string name = {};  ///< of its folder, below the batch's
   BatchCell cell = {};
   CellState state = CellState::fine;
-  CellKind kind = CellKind::plane;
+  CellKind kind = {};
   std::string reason = {};  ///< why it is not fine
   std::vector<Finding> findings = {};
   std::map<std::string, Value> figures = {};     ///< by column
@@ -182,7 +182,7 @@ BatchRow row_of(const BatchCell& cell, const fs::path& folder, const std::vector
   row.state = state_by(row.findings);
   if (row.state == CellState::not_usable) row.reason = "not usable, as " + worst_of(row.findings)->id + " says";
   try {
-    const bool is_fitted = of.kind == CellKind::plane && is_asked(of.stages.back(), only);
+    const bool is_fitted = has_fibres(of.kind) && is_asked(of.stages.back(), only);
     if (is_fitted && files::is_own_file(cell.cell / "4_fit/fit.json")) row.result = files::read_cell_result(cell.cell);
   } catch (const InputError& error) {  // changed by hand
     row.state = CellState::failed;
@@ -200,7 +200,7 @@ CellInField field_of(const BatchRow& row, const char* field) {
     HashCache hashes(row.cell.cell);
     const Hashes found = hashes.hash({field});
     // of a sheet whose outline the stages alone read nobody knows here whether another one lies beside it
-    if (!found.empty() && (row.kind == CellKind::space || !cell.outline_um.empty()))
+    if (!found.empty() && (is_in_space(row.kind) || !cell.outline_um.empty()))
       cell.field_sha256 = found.begin()->second;
   } catch (const InputError&) {  // then it is a copy of nothing
   }
@@ -209,7 +209,7 @@ CellInField field_of(const BatchRow& row, const char* field) {
 
 void mark_copies(std::vector<BatchRow>& rows) {
   const auto field_file = [](const BatchRow& row) {
-    return row.kind == CellKind::space ? "2_track/displacement_3d.csv" : "2_track/displacement.csv";
+    return is_in_space(row.kind) ? "2_track/displacement_3d.csv" : "2_track/displacement.csv";
   };
   std::vector<CellInField> cells;
   for (const BatchRow& row : rows)

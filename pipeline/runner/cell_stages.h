@@ -28,8 +28,8 @@ void declare(stage::ParameterList& list, RunSettings& settings);
 RunSettings read_run_settings(const fs::path& cell);
 
 struct CellStages {
-  CellKind kind = CellKind::plane;
-  std::string why;  ///< "track.z_points is set": for people
+  CellKind kind = {};  ///< on a plane, by fibres
+  std::string why;     ///< "track.z_points is set": for people
   std::vector<Stage> stages = {};
   std::vector<int> first = {};                ///< before all others
   std::vector<std::vector<int>> chains = {};  ///< which run beside each other; the last stage needs them all

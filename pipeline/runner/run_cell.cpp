@@ -69,8 +69,8 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
 
 /// What the preset says to this kind of cell. @throws UsageError where it says nothing
 const std::vector<Setting>& beneath(const RunOptions& options, const CellStages& of) {
-  if (of.kind == CellKind::space) return options.beneath_in_space;
-  if (of.kind == CellKind::plane || options.beneath.empty()) return options.beneath;
+  if (is_in_space(of.kind)) return options.beneath_in_space;
+  if (has_fibres(of.kind) || options.beneath.empty()) return options.beneath;
   throw UsageError("--preset " + options.preset + ": presets are for cells with fibres and cells in space, and this " +
                    "one is a sheet (" + of.why +
                    "): leave it out, and set sheet.mesh_um for finer or coarser triangles");
@@ -94,7 +94,7 @@ class CellRun {
         hashes_(cell_) {
     for (const Setting& setting : options.set) {
       const bool is_made = is_made_for_picture(cell_);
-      if (setting.table == "segment" && setting.key == "cell" && (is_made || setting.value == "0"))
+      if (setting == Setting{"segment", "cell", is_made ? setting.value : "0"})
         throw UsageError("--set segment.cell=" + setting.value +
                          ": each cell of a picture gets a folder and a cell.toml of its own; write cell = " +
                          setting.value + " below [segment] in " +
@@ -125,8 +125,8 @@ class CellRun {
     if (is_whole) remove_partial_files(cell_);
     CellOutcome outcome = look();
     outcome.started = numerics::utc_now();
-    if (of_.kind == CellKind::space && options_.note) options_.note("beads in space, as " + of_.why);
-    if (of_.kind == CellKind::sheet && options_.note) options_.note("a contracting sheet, as " + of_.why);
+    if (is_in_space(of_.kind) && options_.note) options_.note("beads in space, as " + of_.why);
+    if (is_sheet(of_.kind) && options_.note) options_.note("a contracting sheet, as " + of_.why);
     if (const std::string unused = unused_pictures(cell_, images_); !unused.empty() && options_.note)
       options_.note(unused);
     const bool has_work = std::ranges::any_of(

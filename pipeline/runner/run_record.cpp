@@ -152,7 +152,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["cell"] = fs::weakly_canonical(cell).filename().string();
   run["kind"] = name_of(of.kind);
   if (!of.why.empty()) run["kind_because"] = of.why;
-  if (of.kind == CellKind::sheet) {
+  if (is_sheet(of.kind)) {
     const RunSettings settings = read_run_settings(cell);
     run["run"] = {{"model", name_of(settings.model)}, {"bundles", settings.bundles}};
   }
@@ -175,7 +175,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   const bool has_fit = is_done_entry(entries[of.stages.back().name]);
   run["stages"] = std::move(entries);
   const fs::path fit_file = cell / "4_fit/fit.json";
-  if (of.kind == CellKind::plane && has_fit && files::is_own_file(fit_file)) {
+  if (has_fibres(of.kind) && has_fit && files::is_own_file(fit_file)) {
     const files::JsonRecord fit(fit_file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
     if (const auto budget = fit.find("error_budget")) run["error_budget"] = budget->json();
   }

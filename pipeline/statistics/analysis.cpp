@@ -34,7 +34,7 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
     for (std::size_t i = 0; i < n_of.size(); ++i) {
       if (n_of[i] == 0 || n_of[i] >= kFew) continue;
       warnings.push_back(fmt::format("{}{} {} only: {}.", prefix_of(study.conditions[i]), n_of[i],
-                                     n_of[i] == 1 ? in_study(kind).cell : in_study(kind).many,
+                                     n_of[i] == 1 ? in_study(kind).cell : traits_of(kind).many,
                                      n_of[i] == 1 ? "no scatter is known, and no test counts it"
                                                   : "intervals are wide, and suppose a normal scatter"));
     }
@@ -44,7 +44,7 @@ void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
 void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<std::string>& warnings) {
   int n_unknown = 0, n_fibres = 0, n_without = 0;
   for (const StudyCell& cell : study.cells) {
-    n_without += cell.kind() == CellKind::plane && measured_fibres(cell).empty() ? 1 : 0;
+    n_without += has_fibres(cell.kind()) && measured_fibres(cell).empty() ? 1 : 0;
     for (const Tension& t : cell.tensions) {
       n_fibres += t.fibre_id != 0 ? 1 : 0;
       n_unknown += t.fibre_id != 0 && !t.identifiable ? 1 : 0;
@@ -72,8 +72,7 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
 void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   const auto n = std::ranges::count_if(study.cells, [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
-  warnings.push_back(
-      report::sentence("study.warn-network-unresolved", n, counted(n_of_kind(study, CellKind::plane), "cells")));
+  warnings.push_back(report::sentence("study.warn-network-unresolved", n, counted(n_with_fibres(study), "cells")));
 }
 
 /// What the beads do not limit to both sides.
@@ -163,7 +162,7 @@ std::vector<const Measure*> Analysis::of_cells(CellKind kind) const {
 namespace {
 /// The kind that the study has most of; of equally many cells with fibres, then sheets.
 CellKind most_of(const Study& study) {
-  CellKind most = CellKind::plane;
+  CellKind most = kKindsOfCells.front();
   for (const CellKind kind : kKindsOfCells)
     if (n_of_kind(study, kind) > n_of_kind(study, most)) most = kind;
   return most;
@@ -180,29 +179,20 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
     return {analysis.find("tension_nN"), static_cast<int>(kind - sample.kinds.begin()),
             "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"};
   }
-  const auto of = [&](CellKind kind, const std::string& column, const std::string& name) {
-    return PrimaryChoice{analysis.find(column), 0, name + " of " + in_study(kind).many};
-  };
-  switch (asked) {
-    case PrimaryMeasure::contraction:
-      return of(CellKind::sheet, name_of(SheetQuantity::contraction), "contraction");
-    case PrimaryMeasure::mean_tension:
-      return of(CellKind::sheet, "mean_tension_nN_per_um", "mean tension");
-    case PrimaryMeasure::contractile_moment:
-      return of(CellKind::space, "space_contractile_moment_nN_um", "contractile moment");
-    case PrimaryMeasure::strain_energy:
-      return most == CellKind::sheet || analysis.of_cells(CellKind::space).empty()
-                 ? of(CellKind::sheet, "strain_energy_fJ", "strain energy")
-                 : of(CellKind::space, "space_strain_energy_fJ", "strain energy");
-    default:
-      return of(most, in_study(most).force, "total force");
-  }
+  const auto has_it = [&](CellKind kind) { return in_study(kind).columns.contains(asked); };
+  const auto is_there = [&](CellKind kind) { return has_it(kind) && n_of_kind(study, kind) > 0; };
+  auto kind = std::ranges::find_if(kKindsOfCells, is_there);
+  if (kind == kKindsOfCells.end()) kind = std::ranges::find_if(kKindsOfCells, has_it);
+  if (has_it(most)) kind = std::ranges::find(kKindsOfCells, most);
+  std::string name = name_of(asked);
+  std::ranges::replace(name, '-', ' ');
+  return {analysis.find(in_study(*kind).columns.at(asked)), 0, name + " of " + traits_of(*kind).many};
 }
 
 Analysis analyse(const Study& study, const StudyParameters& parameters) {
   const std::vector<CellWeights> draws = draw_cells(study, parameters);
   Analysis a;
-  a.has_fibres = n_of_kind(study, CellKind::plane) > 0;
+  a.has_fibres = n_with_fibres(study) > 0;
   for (Sample& sample : samples_of(study)) a.measures.push_back(measure(std::move(sample), draws));
   a.tensions_by_cell = summarise_by_cell(a.tensions().sample, study);
   a.shares = shares_above(a.tensions().sample, thresholds_nN(parameters));

@@ -129,7 +129,7 @@ Figure forces_by_cell(const Study& study) {
   std::vector<const StudyCell*> cells;
   double largest = 0;
   for (const StudyCell& cell : study.cells) {
-    if (cell.kind() != CellKind::plane) continue;
+    if (!has_fibres(cell.kind())) continue;
     cells.push_back(&cell);
     largest = std::max(largest, cell.fit.total_force_nN);
   }
@@ -212,7 +212,7 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
   std::vector<Figure> figures;
   if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
   for (const CellKind kind : kKindsOfCells)
-    if (kind != CellKind::plane && n_of_kind(study, kind) > 1) figures.push_back(figure_of_kind(study, analysis, kind));
+    if (!has_fibres(kind) && n_of_kind(study, kind) > 1) figures.push_back(figure_of_kind(study, analysis, kind));
   if (!analysis.has_fibres) return figures;
   if (analysis.tensions().sample.values.empty()) {
     figures.push_back(

@@ -43,7 +43,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Qu
                 .condition = study.conditions[condition]};
   std::map<int, std::pair<double, double>> products;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    if (study.cells[i].condition != condition || study.cells[i].kind() != CellKind::plane) continue;
+    if (study.cells[i].condition != condition || !has_fibres(study.cells[i].kind())) continue;
     const std::optional<double> x = size.of(study.cells[i]), y = force.of(study.cells[i]);
     if (!x || !y) continue;
     const int cell = static_cast<int>(i);

@@ -199,12 +199,11 @@ Sample sample_of(const Study& study, const MeasureRow& row) {
 }  // namespace
 
 std::vector<Sample> samples_of(const Study& study) {
-  const bool has_fibres = n_of_kind(study, CellKind::plane) > 0;
+  const bool of_fibres = n_with_fibres(study) > 0;
   std::vector<Sample> samples;
   for (const MeasureRow& row : measure_table(study.n_fibre_types)) {
     Sample sample = sample_of(study, row);
-    if (!sample.values.empty() || (has_fibres && sample.of_cells() == CellKind::plane))
-      samples.push_back(std::move(sample));
+    if (!sample.values.empty() || (of_fibres && has_fibres(sample.of_cells()))) samples.push_back(std::move(sample));
   }
   return samples;
 }

@@ -17,7 +17,7 @@ namespace {
 using charts::readable;
 
 std::string plural_of(const Sample& sample, const std::string& kind) {
-  if (sample.each == Observed::cells || sample.each == Observed::bundles || sample.of_cells() == CellKind::space)
+  if (sample.each == Observed::cells || sample.each == Observed::bundles || is_in_space(sample.of_cells()))
     return name_of(sample.each);
   if (sample.each == Observed::sheets) return sample.n_kinds() == 1 ? "sheets" : "sheets (" + kind + ")";
   return named<FibreType>(kind) == FibreType::arc ? "transverse arcs" : kind + " " + name_of(sample.each);
@@ -176,9 +176,10 @@ std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameter
   };
   std::vector<Findings> all;
   if (analysis.has_fibres) {
-    std::vector<const Measure*> of_plane = analysis.of_cells(CellKind::plane);
-    std::erase_if(of_plane, [](const Measure* m) { return m->sample.each != Observed::cells; });
-    Findings tensions = of("Tensions", {&analysis.tensions()}), cells = of("Cells", of_plane);
+    std::vector<const Measure*> of_cells;
+    for (const Measure& m : analysis.measures)
+      if (m.sample.each == Observed::cells) of_cells.push_back(&m);
+    Findings tensions = of("Tensions", {&analysis.tensions()}), cells = of("Cells", of_cells);
     append(tensions.sentences, shares(analysis, parameters));
     append(cells.sentences, lines(analysis));
     all = {tensions,
@@ -186,8 +187,9 @@ std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameter
            cells,
            {"Directions", directions(analysis), {}}};
   }
-  if (const auto sheets = analysis.of_cells(CellKind::sheet); !sheets.empty()) all.push_back(of("Sheets", sheets));
-  if (const auto cells = analysis.of_cells(CellKind::space); !cells.empty()) all.push_back(of("Cells in space", cells));
+  for (const CellKind kind : kKindsOfCells)
+    if (const auto measures = analysis.of_cells(kind); !has_fibres(kind) && !measures.empty())
+      all.push_back(of(in_study(kind).heading, measures));
   return all;
 }
 

@@ -140,15 +140,12 @@ std::string obstacle(const Path& cell, CellKind kind) {
 
 StudyCell read_cell_of_kind(CellKind kind, const Path& folder, const std::string& name,
                             const StudyParameters& parameters) {
-  if (kind == CellKind::sheet) return read_study_sheet(folder, name);
-  if (kind == CellKind::space) return read_study_cell_in_space(folder, name);
-  return read_study_cell(folder, name, parameters);
+  if (has_fibres(kind)) return read_study_cell(folder, name, parameters);
+  return is_sheet(kind) ? read_study_sheet(folder, name) : read_study_cell_in_space(folder, name);
 }
 
 /// The field of beads that it was found from.
-const char* field_of(const StudyCell& cell) {
-  return cell.kind() == CellKind::space ? report::kBeadsInSpace : kDisplacement;
-}
+const char* field_of(const StudyCell& cell) { return is_in_space(cell.kind()) ? report::kBeadsInSpace : kDisplacement; }
 
 /// A folder that was copied is no further cell: of those of one field and place the first enters.
 void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::string>& names,
@@ -267,46 +264,52 @@ int n_of_kind(const Study& study, CellKind kind) {
   return static_cast<int>(std::ranges::count_if(study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
 }
 
+int n_with_fibres(const Study& study) {
+  return static_cast<int>(std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_fibres(c.kind()); }));
+}
+
 const KindInStudy& in_study(CellKind kind) {
   static const std::array<KindInStudy, 3> all = {
       {{"cell",
         "cells",
-        "cell",
-        "cells",
         "stress-fibre tensions",
         PrimaryMeasure::tension,
-        "total_force_nN",
+        {{PrimaryMeasure::total_force, "total_force_nN"}},
         "Cells",
         "cells",
         "fibres",
         "",
+        nullptr,
         {"1_segment/adhesions.csv", "1_segment/fibres.csv", "1_segment/fibre_points.csv", kOutline,
          "4_fit/tensions.csv", "4_fit/adhesion_forces.csv", "4_fit/fit.json"},
         {kDisplacement, kFitted, kWithoutFibres, kUsual, kRun}},
        {"cell",
         "cells",
-        "cell in space",
-        "cells in space",
         "forces",
         PrimaryMeasure::total_force,
-        "space_force_nN",
+        {{PrimaryMeasure::total_force, "space_force_nN"},
+         {PrimaryMeasure::contractile_moment, "space_contractile_moment_nN_um"},
+         {PrimaryMeasure::strain_energy, "space_strain_energy_fJ"}},
         "Cells in space",
         "cells_in_space",
         "adhesions",
         " of an adhesion",
+        "study.how-to-read-space",
         {report::kBeadsInSpace, "3_surface/surface.vtp", "4_traction/traction.csv", "4_traction/traction.json"},
         {"4_traction/traction_adhesion_forces.csv", "1_segment/adhesions.csv", kOutline, kRun}},
        {"sheet",
         "sheets",
-        "sheet",
-        "sheets",
         "contraction",
         PrimaryMeasure::contraction,
-        "sheet_force_nN",
+        {{PrimaryMeasure::total_force, "sheet_force_nN"},
+         {PrimaryMeasure::contraction, name_of(SheetQuantity::contraction)},
+         {PrimaryMeasure::mean_tension, "mean_tension_nN_per_um"},
+         {PrimaryMeasure::strain_energy, "strain_energy_fJ"}},
         "Sheets",
         "sheets",
         "parts",
         "",
+        "study.how-to-read-sheets",
         {"3_sheet/sheet_fit.csv", "3_sheet/sheet.json", "3_sheet/sheet.csv"},
         {kDisplacement, kOutline, kRun}}}};
   return all.at(static_cast<std::size_t>(kind));

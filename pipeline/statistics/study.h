@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -129,18 +130,19 @@ const std::string& condition_of(const Study& study, const StudyCell& cell);
 /// The type as which a fibre counts.
 FibreType counted_type(const Study& study, FibreType type);
 
-/// Those of one kind: with fibres (plane), sheets, or in space.
 int n_of_kind(const Study& study, CellKind kind);
+/// Those that have fibres.
+int n_with_fibres(const Study& study);
 
 /// What a study has to know of a kind of cells.
 struct KindInStudy {
-  const char *cell, *cells;      ///< "cell"; of sheets "sheet"
-  const char *one, *many;        ///< "cell in space", "cells in space"
-  const char* found;             ///< what the title says of them
-  PrimaryMeasure primary;        ///< of a study that has most of them
-  const char* force;             ///< column of their total force
-  const char *heading, *figure;  ///< of their figures; the name of its file
-  const char *parts, *of_part;   ///< small dots of that figure, and what is added to the name of a part's measure
+  const char *cell, *cells;                       ///< "cell"; of sheets "sheet"
+  const char* found;                              ///< what the title says of them
+  PrimaryMeasure primary;                         ///< of a study that has most of them
+  std::map<PrimaryMeasure, std::string> columns;  ///< of the measures that they have
+  const char *heading, *figure;                   ///< of their figures; the name of its file
+  const char *parts, *of_part;  ///< small dots of that figure, and what is added to the name of a part's measure
+  const char* how_to_read;      ///< sentence on their measures, or none
   std::vector<std::string> files, further_files;  ///< that must be there, and that are read if they are
 };
 const KindInStudy& in_study(CellKind kind);

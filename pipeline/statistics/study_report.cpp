@@ -150,14 +150,19 @@ std::string overview(const Study& study, const Analysis& analysis) {
         std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
   }
   std::string html = "<p>";
-  if (const int n = n_of_kind(study, CellKind::plane); n > 0)
+  if (const int n = n_with_fibres(study); n > 0)
     html += report::sentence("study.cells-with-fibres", counted(n, "cells"), counted(n_adhesions, "adhesions"),
                              counted(n_fibres, "stress fibres"), analysis.tensions().sample.values.size()) +
             " ";
-  if (const int n = n_of_kind(study, CellKind::sheet); n > 0)
-    html += fmt::format("{}; identified contractions: {}. ", counted(n, "sheets"),
-                        n_cells_of(analysis.of(name_of(SheetQuantity::contraction)).sample.values));
-  if (const int n = n_of_kind(study, CellKind::space); n > 0) html += counted(n, "cell in space. ", "cells in space. ");
+  for (const CellKind kind : kKindsOfCells) {
+    const int n = n_of_kind(study, kind);
+    if (n == 0 || has_fibres(kind)) continue;
+    html += counted(n, traits_of(kind).one, traits_of(kind).many);
+    if (is_sheet(kind))
+      html += fmt::format("; identified contractions: {}",
+                          n_cells_of(analysis.of(name_of(SheetQuantity::contraction)).sample.values));
+    html += ". ";
+  }
   if (has_conditions(study)) html += counted(study.conditions.size(), "conditions") + ". ";
   html += counted(study.left_out.size(), "cell was", "cells were") + " left out.</p>\n";
   if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
@@ -200,7 +205,8 @@ std::string title_of(const Study& study) {
   std::vector<std::string> parts;
   for (const CellKind kind : kKindsOfCells)
     if (const int n = n_of_kind(study, kind); n > 0)
-      parts.push_back(std::string(in_study(kind).found) + " of " + counted(n, in_study(kind).one, in_study(kind).many));
+      parts.push_back(std::string(in_study(kind).found) + " of " +
+                      counted(n, traits_of(kind).one, traits_of(kind).many));
   std::string title = parts.front();
   for (std::size_t i = 1; i < parts.size(); ++i) title += (i + 1 < parts.size() ? ", " : " and ") + parts[i];
   return report::capitalised(title);
@@ -225,11 +231,11 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   for (const Figure& figure : figures)
     if (figure.name != kPrimaryFigure) pictures += embedded(figure);
   body += report::section("Figures", "<div class=\"grid\">\n" + pictures + "</div>\n");
-  body += report::section(
-      "All measures", on_edge_fibres(study) +
-                          (analysis.of_cells(CellKind::sheet).empty() ? "" : report::note("study.how-to-read-sheets")) +
-                          (analysis.of_cells(CellKind::space).empty() ? "" : report::note("study.how-to-read-space")) +
-                          measures_table(files));
+  std::string how_to_read;
+  for (const CellKind kind : kKindsOfCells)
+    if (const char* text = in_study(kind).how_to_read; text != nullptr && !analysis.of_cells(kind).empty())
+      how_to_read += report::note(text);
+  body += report::section("All measures", on_edge_fibres(study) + how_to_read + measures_table(files));
   for (const Measure& m : analysis.measures)
     if (!m.comparisons.empty())
       tests += report::folded("Tests of the " + m.sample.name + " of " + name_of(m.sample.each),

@@ -55,7 +55,7 @@ struct CellRow {
 };
 
 /// None where a cell has no fibres.
-const FitSummary* fibre_fit_of(const StudyCell& c) { return c.kind() == CellKind::plane ? &c.fit : nullptr; }
+const FitSummary* fibre_fit_of(const StudyCell& c) { return has_fibres(c.kind()) ? &c.fit : nullptr; }
 /// None also where the network's tension is not known, and its figures have no meaning.
 const FitSummary* network_fit_of(const StudyCell& c) {
   return fibre_fit_of(c) && is_network_known(c) ? &c.fit : nullptr;
@@ -64,7 +64,7 @@ const FitSummary* network_fit_of(const StudyCell& c) {
 /// Fibres of a type, or of all.
 auto n_fibres(std::optional<FibreType> type) {
   return [type](const StudyCell& c) -> std::optional<int> {
-    if (c.kind() != CellKind::plane) return std::nullopt;
+    if (!has_fibres(c.kind())) return std::nullopt;
     const auto is_one = [&](const Fibre& f) { return !type || f.type == *type; };
     return static_cast<int>(std::ranges::count_if(c.cell.fibres, is_one));
   };
@@ -126,7 +126,7 @@ Columns<StudyCell> figure_columns() {
   const auto of_fit = [](auto figure) { return member(&C::fit, figure); };
   return {{"n_adhesions",
            [](const C& c) -> std::optional<int> {
-             if (c.kind() != CellKind::plane) return std::nullopt;
+             if (!has_fibres(c.kind())) return std::nullopt;
              return static_cast<int>(figures_of(c).n_adhesions);
            }},
           {"n_fibres", n_fibres({})},
