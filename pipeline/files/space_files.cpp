@@ -9,7 +9,9 @@ Table<SurfaceTraction> surface_traction_table() {
     return {name,
             [axis](const Row& row) { return row.sigma_kPa ? std::optional((*row.sigma_kPa).*axis) : std::nullopt; },
             [axis](Row& row, const std::optional<double>& value) {
-              if (value) (row.sigma_kPa ? *row.sigma_kPa : row.sigma_kPa.emplace()).*axis = *value;
+              if (!value) return;
+              if (!row.sigma_kPa) row.sigma_kPa.emplace();
+              (*row.sigma_kPa).*axis = *value;  // GCC 12 writes (a ? b : c).*axis into a copy
             },
             kResult};
   };

@@ -1,6 +1,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/space_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/texts.h"
 #include "pipeline/files/vtk_files.h"
@@ -352,6 +353,14 @@ TEST_F(Files, tractions_are_read_as_people_write_them) {
   const auto error = test::caught<InputError>([&] { read("x;y;tx;ty\n" + rows); });
   ASSERT_TRUE(error);
   EXPECT_TRUE(has_words(error->what(), "tx_kPa")) << error->what();
+}
+
+TEST_F(Files, standard_errors_of_tractions_in_space_come_back_where_they_are_known) {
+  const std::vector<SurfaceTraction> rows = {{.sigma_kPa = Vec3{1, 2, 3}}, {}};
+  files::write(folder / "t.csv", files::surface_traction_table(), rows);
+  const std::vector<SurfaceTraction> back = files::read(folder / "t.csv", files::surface_traction_table());
+  EXPECT_EQ(norm(back[0].sigma_kPa.value_or(Vec3{}) - Vec3{1, 2, 3}), 0);
+  EXPECT_FALSE(back[1].sigma_kPa);
 }
 
 TEST_F(Files, what_has_no_end_is_refused_and_what_is_empty_is_empty) {
