@@ -135,7 +135,7 @@ TEST(Report, the_methods_paragraph_has_the_numbers_of_this_cell) {
   const std::size_t at = html.find("For-your-methods-section");
   ASSERT_NE(at, html.npos);
   const std::string paragraph = html.substr(html.find("<p class=\"cite\">", at));
-  for (const char* part : {"8.4 kPa", "12 adhesions", "4 stress fibres"})
+  for (const char* part : {"8.4\u00a0kPa", "12 adhesions", "4 stress fibres"})
     EXPECT_LT(paragraph.find(part), paragraph.find("</p>")) << part;
 }
 
