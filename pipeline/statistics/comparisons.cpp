@@ -69,8 +69,10 @@ void add_tests(std::vector<Comparison>& list, const Sample& sample, const Family
     }
     for (std::size_t i = 0; i < groups.size(); ++i) {
       for (std::size_t k = i + 1; k < groups.size(); ++k) {
-        tests.push_back(blank(sample, family, test.second, unit, groups[i], &groups[k]));
-        of_pair(tests.back(), i, k);
+        // of conditions the later one less the earlier: the reference is the first
+        const auto [a, b] = family.question == Question::between_conditions ? std::pair(k, i) : std::pair(i, k);
+        tests.push_back(blank(sample, family, test.second, unit, groups[a], &groups[b]));
+        of_pair(tests.back(), a, b);
         p_values.push_back(tests.back().p_value);
       }
     }

@@ -72,14 +72,13 @@ void compare_cells(const Sample& sample, int kind, const std::optional<SampleMod
   for (const Comparison& c : comparisons) {
     if (c.test != Test::mixed_model || c.question != Question::between_conditions || c.group_b.empty()) continue;
     if (c.within != sample.kinds[kind]) continue;
-    // conditions are in their order: the reference can only be the first of a pair
-    if (c.group_a != primary.reference || !c.interval) continue;
+    if (c.group_b != primary.reference || !c.interval) continue;
     const double error = c.statistic != 0 ? std::abs(c.effect / c.statistic) : 0;
     if (!(error > 0)) continue;
-    primary.differences.push_back({.condition = c.group_b,
-                                   .difference = by_students_t(-c.effect, error, *c.degrees),
-                                   .cells = c.cells_b,
-                                   .cells_before = c.cells_a});
+    primary.differences.push_back({.condition = c.group_a,
+                                   .difference = by_students_t(c.effect, error, *c.degrees),
+                                   .cells = c.cells_a,
+                                   .cells_before = c.cells_b});
   }
   if (primary.differences.empty())
     primary.obstacle = "the reference and one other condition need two " + primary.cells + " each with a known value";
