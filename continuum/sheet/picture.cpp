@@ -69,9 +69,10 @@ void draw_values(Chart& map, const Solution& solution, const Extent& frame, cons
     map.bar(s.middle - d, s.middle + d, "fill:" + colour + ";stroke:none");
   }
   map.put_key(Chart::KeySide::above);
-  for (const double share : {0.0, 0.5, 1.0})
-    map.key(charts::readable(low + share * range) + " " + unit,
-            charts::hex(charts::colour_at(charts::ColourMap::plasma, share)));
+  const std::vector<double> ticks = charts::ticks(low, low + range);
+  for (std::size_t k = 0; k<ticks.size(); k += ticks.size()> 3 ? 2 : 1)  // there is room for three
+    map.key(charts::readable(ticks[k]) + " " + unit,
+            charts::hex(charts::colour_at(charts::ColourMap::plasma, (ticks[k] - low) / range)));
 }
 
 void draw_rims(Chart& map, const Solution& solution) {

@@ -188,18 +188,20 @@ std::string item(const char* kind, const char* mark, const std::string& text, co
 
 constexpr const char* kPage = "docs/findings.md";
 
-/// The remedy in sight and the page's name; number, threshold and its reason unfold. A report goes where the
-/// pages do not: it names them, and links to none. @param next  has the remedy, too, if it is the same
+/// The remedy in sight; number, threshold, its reason and the page's name unfold. A report goes where the pages do
+/// not: it names them, and links to none. @param next  has the remedy, too, if it is the same
 std::string details_of(const Finding& f, const Finding* next) {
   std::string html;
   const bool is_repeated = next && next->remedy == f.remedy && next->severity == f.severity;
   if (is_open(f) && !f.remedy.empty() && !is_repeated) html += "<br><i>What to do:</i> " + printed(f.remedy);
   if (f.number && f.threshold) {
-    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", html_escaped(f.id),
+    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{} ({})</details>", html_escaped(f.id),
                         printed(f.number_is), readable(*f.number), readable(*f.threshold), printed(f.reason),
-                        is_open(f) ? "" : " " + printed(f.remedy));
+                        is_open(f) ? "" : " " + printed(f.remedy), kPage);
+  } else if (is_open(f)) {
+    html += fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, html_escaped(f.id));
   }
-  return html + (is_open(f) ? fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, html_escaped(f.id)) : "");
+  return html;
 }
 
 /// By Severity: the item's class and its mark.

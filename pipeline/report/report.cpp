@@ -45,7 +45,7 @@ std::string effects_table(const Provenance& provenance, bool is_on) {
   }
   if (table.rows.empty()) return {};
   return is_on ? "<h3>Effects</h3>\n" + html_of(table)
-               : folded(fmt::format("{} that are off", counted(table.rows.size(), "effects")), html_of(table));
+               : folded(counted(table.rows.size(), "effect that is off", "effects that are off"), html_of(table));
 }
 
 /// Stages, effects, parameters. @param figures  HTML, of the last stage

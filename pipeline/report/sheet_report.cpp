@@ -63,7 +63,7 @@ std::string methods(const SheetResults& r, const Provenance& provenance) {
 
 std::vector<Listing> tables_of_sheet(const fs::path& estimates, const fs::path& models, const std::string& of) {
   const std::string fit_csv = files::read_text(estimates);
-  return {{"What the beads tell", sentence("sheet.estimates"), of + "sheet_fit.csv", fit_csv,
+  return {{"What the beads show", sentence("sheet.estimates"), of + "sheet_fit.csv", fit_csv,
            sentence("sheet.columns-of-estimates")},
           {"Does the scene call for the sheet?", sentence("sheet.models"), of + "sheet_models.csv",
            files::read_text(models), sentence("sheet.columns-of-models")},
