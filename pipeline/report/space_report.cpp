@@ -121,7 +121,7 @@ std::string lambda_section(const SpaceResults& r) {
   const std::string text = how_lambda(r);
   if (text.empty()) return {};
   return section("Regularisation", "<p>" + html_escaped(text) + "</p>\n" +
-                                       svg_of(r.folder / "4_traction/traction_lambda.svg", "Criteria by lambda",
+                                       svg_of(r.folder / "4_traction/traction_lambda.svg", "Criteria by λ",
                                               sentence("space.lambda-picture")));
 }
 

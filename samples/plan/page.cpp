@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/counted.h"
 #include "pipeline/report/stage_page.h"
 #include "pipeline/report/texts.h"
 #include "samples/plan/answer.h"
@@ -206,7 +207,8 @@ std::string html_of(const PlanOf<Quantity>& plan) {
     body += report::section("How many cells",
                             report::html_of(cell_listing(plan.cells)) +
                                 report::note("plan.test", report::html_escaped(plan.cells.front().scatter.source)));
-  body += report::section("All numbers", report::html_of(expected_listing(plan)));
+  body += report::section("All numbers", report::folded(counted(std::ssize(plan.grid.expected), "rows"),
+                                                        report::html_of(expected_listing(plan))));
   return report::html_of(report::Page{.title = "Plan: " + plan.name, .what = answer_sentence(plan), .body = body});
 }
 
