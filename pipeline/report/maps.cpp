@@ -84,12 +84,31 @@ SortedLinks sorted_links(const Network& network, const std::vector<double>& link
   return sorted;
 }
 
+/// Of the strongest fibres first, as far as there is room: the mouse finds the others.
 void draw_fibre_ids(Chart& map, const CellResults& results) {
+  constexpr double kNarrow_px = 230, kWidth_px = 28, kHeight_px = 14;  // of a frame among three; of a label
   const Extent box = map_box(results);
-  const double clear_um = 15 * (box.high_um.x - box.low_um.x) / Chart::kFrameWidth_px;  // about a label's width
-  for (const Fibre& fibre : results.cell.fibres) {
-    map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(),
-              letter_of(fibre.type) + std::to_string(fibre.fibre_id));
+  const double um_per_px = (box.high_um.x - box.low_um.x) / kNarrow_px;
+  const auto tension_nN = [&](const Fibre* fibre) {
+    const auto found = results.tensions.find(fibre->fibre_id);
+    return found == results.tensions.end() ? 0 : found->second.tension_nN;
+  };
+  std::vector<const Fibre*> order;
+  for (const Fibre& fibre : results.cell.fibres) order.push_back(&fibre);
+  std::ranges::stable_sort(order, std::greater{}, tension_nN);
+  std::vector<Vec2> taken;
+  const auto is_free = [&](Vec2 place) {
+    return std::ranges::none_of(taken, [&](Vec2 other) {
+      const Vec2 apart_px = 1 / um_per_px * (place - other);
+      return std::abs(apart_px.x) < kWidth_px && std::abs(apart_px.y) < kHeight_px;
+    });
+  };
+  for (const Fibre* fibre : order) {
+    const auto places = label_places_um(*fibre, results.cell.fibres, 0.5 * kWidth_px * um_per_px);
+    const auto free = std::ranges::find_if(places, is_free);
+    if (free == places.end()) continue;
+    map.label(*free, letter_of(fibre->type) + std::to_string(fibre->fibre_id));
+    taken.push_back(*free);
   }
 }
 
