@@ -109,7 +109,9 @@ judge() {
   fi
   [ "$outcome" = survived ] || return 0
   cp "$work/source/$file" "$work/original"
-  cp "$work/planted.cpp" "$work/source/$file"
+  # what the fault leaves unused is no reason not to build
+  { for unused in parameter variable but-set-variable function; do echo "#pragma GCC diagnostic ignored \"-Wunused-$unused\""; done
+    cat "$work/planted.cpp"; } >"$work/source/$file"
   if ! build "$target"; then
     outcome='does not build'
   elif failed=$(failed_test "$2"); then

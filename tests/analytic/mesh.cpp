@@ -23,6 +23,12 @@ Cell square(double side) {
   return cell;
 }
 
+TEST(SizeField, grows_from_what_is_resolved_up_to_an_edge) {
+  SizeField size(1.5, 0.3, {{-10, -10}, {10, 10}});
+  size.refine({0, 0}, 0.3);
+  for (const double d : {0.0, 0.5, 2.0, 9.0}) EXPECT_NEAR(size.at({0, d}), std::min(1.5, 0.3 + 0.3 * d), 1e-12) << d;
+}
+
 TEST(Mesh, quality_is_one_for_an_equilateral_and_zero_for_a_flat_triangle) {
   EXPECT_NEAR(quality({0, 0}, {1, 0}, {0.5, std::sqrt(3.0) / 2}), 1, 1e-12);
   EXPECT_EQ(quality({0, 0}, {1, 0}, {2, 0}), 0);
