@@ -19,8 +19,7 @@ namespace {
 std::vector<Frame> frames_of(stage::StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
   if (!files::is_folder(given)) return frames_of_file(context.input("stressed"), parameters);
-  const std::vector<std::string> names = survey::images_in(given);
-  if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png, .jpg, .jpeg)", "none");
+  const std::vector<std::string> names = survey::frames_in(given);
   context.input("stressed", names);
   std::vector<Frame> frames;
   for (const std::string& name : names) frames.push_back({given / name, parameters.stressed_plane});

@@ -3,11 +3,13 @@
 #include <map>
 
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/beads/given_field.h"
 #include "segment/cells/segment_cell.h"
 #include "segment/stacks/run.h"
+#include "segment/survey/roles.h"
 
 namespace mbtfm::survey {
 namespace {
@@ -27,10 +29,13 @@ Chosen chosen_in(const std::filesystem::path& toml) {
   return chosen;
 }
 
-std::optional<images::Channel> channel(const std::optional<std::filesystem::path>& file,
+/// Of a series, which is a folder, the first frame.
+std::optional<images::Channel> channel(const std::optional<std::filesystem::path>& given,
                                        const images::PlaneChoice& choice) {
-  if (!file) return std::nullopt;
-  return images::Channel{.name = file->filename().string(), .image = images::read_image(*file, choice)};
+  if (!given) return std::nullopt;
+  const std::string frame = files::is_folder(*given) ? frames_in(*given).front() : "";
+  const std::filesystem::path file = frame.empty() ? *given : *given / frame;
+  return images::Channel{.name = file.filename().string(), .image = images::read_image(file, choice)};
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <string_view>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 
@@ -47,6 +48,12 @@ std::vector<std::string> images_in(const std::filesystem::path& folder) {
     if (std::ranges::find(kEndings, files::lower_case(file.extension().string())) != kEndings.end() &&
         files::is_file(file))
       names.push_back(file.filename().string());
+  return names;
+}
+
+std::vector<std::string> frames_in(const std::filesystem::path& folder) {
+  std::vector<std::string> names = images_in(folder);
+  if (names.empty()) throw InputError(folder.string(), "images (.tif, .tiff, .png, .jpg, .jpeg)", "none");
   return names;
 }
 

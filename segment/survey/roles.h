@@ -11,6 +11,8 @@ namespace mbtfm::survey {
 /// The names of a folder's visible TIFF, PNG and JPEG files, in capitals or not, in their order with numbers as
 /// numbers.
 std::vector<std::string> images_in(const std::filesystem::path& folder);
+/// The same of the frames of a series. @throws InputError where there are none
+std::vector<std::string> frames_in(const std::filesystem::path& folder);
 
 struct Roles {
   std::map<std::string, std::string> files;  ///< by key of [images]: adhesion, actin, beads_stressed, beads_relaxed

@@ -243,6 +243,10 @@ TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) 
   const std::string toml = files::read_text(cell_ / "cell.toml");
   files::write_text(cell_ / "cell.toml", toml + "\n[network]\nedge_length_um = -1\n");
   EXPECT_TRUE(has_words(output_of("mbtfm check " + cell_.string(), kFailed), "edge_length_um"));
+  fs::create_directory(cell_ / "frames");  // of a series the first is looked at
+  fs::copy_file(cell_ / "beads_stressed.tif", cell_ / "frames/t2.tif");
+  files::write_text(cell_ / "cell.toml", toml + "\n[images]\nbeads_stressed = \"frames\"\n");
+  EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string()).output, "; fine"));
   files::write_text(cell_ / "cell.toml", toml);
   const Outcome both = run_program("mbtfm check " + cell_.string() + " " + cell_.string());
   EXPECT_NE(both.output.find("1 of 1 cells are fine"), both.output.rfind("1 of 1 cells are fine")) << both.output;
