@@ -158,9 +158,9 @@ TEST(Adhesions, two_that_touch_are_two) {
 
 TEST(Adhesions, two_are_two_without_a_dip_between_them_and_one_is_one) {
   const double pixel_um = 0.1;
-  // tip to tip and side by side, 0.12 um apart, less than one standard deviation of the blur; and a long one
-  const std::vector<Adhesion> drawn = {ellipse(1, {4, 4}, 1.6, 0.6, 0), ellipse(2, {5.72, 4}, 1.6, 0.6, 0),
-                                       ellipse(3, {10, 10}, 1.6, 0.6, 1), ellipse(4, {10.606, 9.611}, 1.6, 0.6, 1),
+  // tip to tip and side by side, 0.06 um apart, half a standard deviation of the blur; and a long one
+  const std::vector<Adhesion> drawn = {ellipse(1, {4, 4}, 1.6, 0.6, 0), ellipse(2, {5.66, 4}, 1.6, 0.6, 0),
+                                       ellipse(3, {10, 10}, 1.6, 0.6, 1), ellipse(4, {10.555, 9.643}, 1.6, 0.6, 1),
                                        ellipse(5, {4, 11}, 3.2, 0.6, 0.5)};
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     SCOPED_TRACE(seed);
