@@ -58,6 +58,32 @@ Ring ring_along_edge(const Cell& cell) {
   return ring;
 }
 
+/// Of the adhesions that are too small to be found: those below the smallest one, where the logarithms of areas are
+/// normal (Cohen, Technometrics 1 (1959) 217), but no more than were found; the smaller half's mean force each.
+double unseen_nN(const std::vector<Adhesion>& adhesions, const VectorXd& forces_nN) {
+  std::vector<double> areas_um2;
+  for (const Adhesion& a : adhesions) areas_um2.push_back(a.area_um2);
+  const double smallest_um2 = std::ranges::min(areas_um2), middle_um2 = numerics::median(areas_um2);
+  double mean = 0, square = 0, n_small = 0, small_nN = 0;  // of ln(area / smallest)
+  for (std::size_t a = 0; a < areas_um2.size(); ++a) {
+    const double x = std::log(areas_um2[a] / smallest_um2);
+    mean += x / static_cast<double>(areas_um2.size());
+    square += x * x / static_cast<double>(areas_um2.size());
+    if (areas_um2[a] > middle_um2) continue;
+    n_small += 1;
+    small_nN += forces_nN.segment<2>(2 * static_cast<Index>(a)).norm();
+  }
+  double low = -8, high = 0;  // of the smallest one, in standard deviations from the law's mean
+  while (high - low > 1e-3) {
+    const double h = 0.5 * (low + high), above = numerics::normal_above(h),
+                 Z = std::exp(-0.5 * h * h) / std::sqrt(2 * std::numbers::pi) / above;
+    const bool is_below = (square - mean * mean) * (Z - h) * (Z - h) < (1 - Z * (Z - h)) * mean * mean;
+    (is_below ? high : low) = h;
+  }
+  const double share = numerics::normal_below(high);
+  return share / (1 - share) * static_cast<double>(areas_um2.size()) * small_nN / n_small;
+}
+
 /// Of the beads, 2·beads × 1; no rows where no place is free.
 MatrixXd displacement_by_ring(const LinearData& data, const Cell& cell, const Gel& gel) {
   const Ring ring = ring_along_edge(cell);
@@ -70,7 +96,6 @@ MatrixXd displacement_by_ring(const LinearData& data, const Cell& cell, const Ge
 }  // namespace
 
 EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel) {
-  constexpr double kExpected = 0.1, kOfFound = 0.25;
   if (are_assumed(cell.adhesions)) return {};
   const VectorXd forces_nN = adhesion_forces_nN(fit);
   double inward_nN = 0;
@@ -89,10 +114,10 @@ EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel)
   const double per_inward = std::min(3.0, total_nN(forces_nN) / inward_nN),
                z = scores.scores[0] / std::sqrt(information),
                sigma_nN = per_inward * std::sqrt(left.variance() / information),
-               r = 1 / (1 + std::pow(sigma_nN / (kOfFound * total_nN(forces_nN)), 2)),
+               r = 1 / (1 + std::pow(sigma_nN / (0.5 * unseen_nN(cell.adhesions, forces_nN)), 2)),
                log_factor = std::log(2 * std::sqrt(1 - r)) + 0.5 * r * z * z +
                             std::log(std::max(numerics::normal_below(std::sqrt(r) * z), 1e-300));
-  return {.probability = 1 / (1 + (1 - kExpected) / kExpected * std::exp(-log_factor)),
+  return {.probability = 1 / (1 + 2 * std::exp(-log_factor)),
           .sum_nN = std::max(0.0, r * z * sigma_nN),
           .sigma_nN = std::sqrt(r) * sigma_nN,
           .per_inward = per_inward};

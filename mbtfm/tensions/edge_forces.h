@@ -15,14 +15,14 @@ struct EdgeForces {
   double probability = 0;           ///< that there are any
   double sum_nN = 0, sigma_nN = 0;  ///< of their magnitudes, if there are
   double per_inward = 1;            ///< magnitudes over their parts along the inward normal, as at the adhesions
-  bool are_there() const { return probability > 0.5; }
+  bool are_there() const { return probability > 0.8; }  ///< the total holds them
 };
 
 /// Of even forces on free places as near to the edge as three in four of the adhesions, inwards along its normal. Their
-/// sum a is expected in one cell of ten, |N(0, τ²)| with τ a quarter of the sum of the forces that were found. With the
-/// score test's â and σ (search.h) and r = τ²/(τ² + σ²),
+/// sum a is expected in one cell of three, |N(0, τ²)|. τ is half of what adhesions too small to be found exert, of
+/// which their neighbours take over anything. With the score test's â and σ (search.h) and r = τ²/(τ² + σ²),
 ///
-///   B = 2 √(1 − r) exp(r â²/2σ²) Φ(√r â/σ),   probability = B / (9 + B).
+///   B = 2 √(1 − r) exp(r â²/2σ²) Φ(√r â/σ),   probability = B / (2 + B).
 EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel);
 
 /// Total and network's force with these, if they are there, and with the error by what is not known of them: whether
