@@ -27,7 +27,7 @@ inline constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#00805C", "#B8
 
 /// Of the fibres' types, in every chart and page.
 constexpr const char* colour_of(FibreType type) {
-  constexpr const char* kOfType[] = {"#0072B2", "#B87A00", "#00805C", "#B5482A"};  // dorsal, arc, ventral, edge
+  constexpr const char* kOfType[] = {"#0072B2", "#B87A00", "#00805C", "#B5482A", "#6E6E6E"};  // as kFibreTypes
   return kOfType[static_cast<int>(type)];
 }
 

@@ -41,13 +41,15 @@ struct Adhesion {
 double area_stood_for_um2(const Adhesion& adhesion);
 
 /// Hotulainen & Lappalainen (2006): dorsal fibres end on an adhesion with one end, arcs with none, ventral with both.
-/// An edge fibre is held at both ends, too, and runs along a free piece of the outline.
-enum class FibreType { dorsal, arc, ventral, edge };
-constexpr auto words(FibreType) { return std::array{"dorsal", "arc", "ventral", "edge"}; }
+/// An edge fibre is held at both ends, too, and runs along a free piece of the outline. Unclassified: none of these
+/// four is as probable as not.
+enum class FibreType { dorsal, arc, ventral, edge, unclassified };
+constexpr auto words(FibreType) { return std::array{"dorsal", "arc", "ventral", "edge", "unclassified"}; }
 /// The first of its name, for labels: types are told apart without colour, too.
 constexpr char letter_of(FibreType type) { return name_of(type)[0]; }
-inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge};
-/// How many of its ends the type says are held.
+inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge,
+                                            FibreType::unclassified};
+/// How many of its ends the type says are held; of an unclassified fibre: may be.
 int n_held_ends(FibreType type);
 
 struct Fibre {
@@ -59,7 +61,7 @@ struct Fibre {
   double mean_intensity = 0;
   double confidence = 1;       ///< that it is a fibre, 0 to 1
   Polyline points_um;          ///< at least two, no two in a row equal
-  double type_confidence = 1;  ///< that its type is right, 0 to 1
+  double type_confidence = 1;  ///< of the most probable of the four types, 0 to 1
   std::string type_reason{};   ///< in words; empty: none given
 };
 

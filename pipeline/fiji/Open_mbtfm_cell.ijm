@@ -1,6 +1,6 @@
 // Open a cell folder of mbtfm in Fiji: the actin and adhesion images, and what was found as selections in the ROI Manager.
 // Correct fibres there; then Select All and More >> Save as fibres.zip in the cell folder, and run mbtfm again. Names as
-// "ventral 3", "dorsal 1", "arc 2" or "edge 4" fix a fibre's type.
+// "ventral 3", "dorsal 1", "arc 2", "edge 4" or "unclassified 5" fix a fibre's type.
 //
 // Install: copy this file into Fiji's folder "macros", then Plugins > Macros > Run. In a script: argument = the cell folder.
 folder = getArgument();

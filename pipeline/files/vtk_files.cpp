@@ -280,7 +280,7 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
   Shapes shapes;
   struct Label {
     int fibre_id = 0;
-    int fibre_type = 0;  // 1 dorsal, 2 arc, 3 ventral, 4 edge; 0: no fibre
+    int fibre_type = 0;  // from 1, as kFibreTypes; 0: no fibre
     int adhesion_id = 0;
     int adhesion_origin = 0;  // 1 image, 2 drawn, 3 anchor, 4 candidate, 5 beads; 0: none
   };

@@ -209,7 +209,7 @@ std::string comparison_text(const fs::path& cell) {
     return text + (compared.note.empty() ? "" : "\n" + compared.note) + report;
   }
   const Comparison comparison = compare_with_truth(cell);
-  constexpr const char* kRow = "{:>5}  {:>5}  {:<8} {:<8} {:>9} {:>9} {:>9} {:>9}\n";
+  constexpr const char* kRow = "{:>5}  {:>5}  {:<12} {:<8} {:>9} {:>9} {:>9} {:>9}\n";
   std::string text =
       fmt::format(fmt::runtime(kRow), "fibre", "true", "type", "true", "tension", "low", "high", "truth");
   text += fmt::format(fmt::runtime(kRow), "id", "id", "", "type", "nN", "nN", "nN", "nN");

@@ -77,11 +77,12 @@ std::string total_in_words(const FitSummary& fit) {
 std::string what(const CellResults& results) {
   int n_by_type[std::size(kFibreTypes)] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
-  const int n_edge = n_by_type[static_cast<int>(FibreType::edge)];
+  std::string others;
+  for (const FibreType type : {FibreType::edge, FibreType::unclassified})
+    if (const int n = n_by_type[static_cast<int>(type)]; n > 0) others += fmt::format(", {} {}", n, name_of(type));
   return sentence("cell.what", counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
-                  counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
-                  n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
-                  total_in_words(results.fit), parts_of_total(results)) +
+                  counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2], others,
+                  adhesions_in_words(results.cell), total_in_words(results.fit), parts_of_total(results)) +
          of_candidates(results.cell) + of_cut(results.fit);
 }
 

@@ -172,10 +172,8 @@ Figure segmentation_map(const CellResults& results) {
                 hover_of(adhesion, results));
   }
   std::string types;
-  const bool has_edge_fibres =
-      std::ranges::find(results.cell.fibres, FibreType::edge, &Fibre::type) != results.cell.fibres.end();
   for (const FibreType type : kFibreTypes) {
-    if (type == FibreType::edge && !has_edge_fibres) continue;
+    if (type >= FibreType::edge && std::ranges::count(results.cell.fibres, type, &Fibre::type) == 0) continue;
     types += fmt::format("<span>{}{} ({})</span>", swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)),
                          full_name_of(type), letter_of(type));
   }

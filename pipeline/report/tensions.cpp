@@ -155,11 +155,11 @@ std::string missed_fibres(const Comparison& comparison) {
 }  // namespace
 
 const char* full_name_of(FibreType type) {
-  constexpr std::array kNames = {"dorsal", "transverse arc", "ventral", "edge"};
+  constexpr std::array kNames = {"dorsal", "transverse arc", "ventral", "edge", "unclassified"};
   return kNames.at(static_cast<std::size_t>(type));
 }
 const char* bright_colour_of(FibreType type) {
-  constexpr std::array kColours = {"#56b4ff", "#ffb728", "#00d68f", "#ff7a52"};
+  constexpr std::array kColours = {"#56b4ff", "#ffb728", "#00d68f", "#ff7a52", "#b8b8b8"};
   return kColours.at(static_cast<std::size_t>(type));
 }
 const char* dashes_of(FibreType type) { return type == FibreType::edge ? ";stroke-dasharray:9 4 2 4" : ""; }
@@ -174,6 +174,7 @@ std::string swatch_of(FibreType type, const std::string& colour) {
 
 std::string hover_of(const Fibre& fibre, const CellResults& results) {
   std::string text = fmt::format("fibre {} ({})", fibre.fibre_id, full_name_of(fibre.type));
+  if (fibre.type == FibreType::unclassified && !fibre.type_reason.empty()) text += "\n" + fibre.type_reason;
   if (const auto found = results.tensions.find(fibre.fibre_id); found == results.tensions.end()) {
     text += "\nnot fitted";
   } else {
@@ -303,6 +304,8 @@ std::string tension_notes(const CellResults& results) {
   const bool has_truth = results.comparison.has_value();
   return note("cell.network-tension", readable(results.fit.network_surface_tension_nN_per_um),
               has_truth ? " " + sentence("cell.truth-errors") : "") +
+         (std::ranges::count(results.cell.fibres, FibreType::unclassified, &Fibre::type) > 0 ? note("cell.unclassified")
+                                                                                             : "") +
          (has_truth ? missed_fibres(*results.comparison) : "");
 }
 

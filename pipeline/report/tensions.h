@@ -43,7 +43,7 @@ const char* bright_colour_of(FibreType type);
 const char* dashes_of(FibreType type);
 /// Its mark in legends and tables, as HTML.
 std::string swatch_of(FibreType type, const std::string& colour);
-/// "dorsal", "transverse arc", "ventral", "edge"
+/// "dorsal", "transverse arc", "ventral", "edge", "unclassified"
 const char* full_name_of(FibreType type);
 
 }  // namespace mbtfm::report

@@ -125,6 +125,7 @@ files::Table<BatchRow> batch_table() {
           tension_column(FibreType::arc),
           tension_column(FibreType::ventral),
           tension_column(FibreType::edge),
+          tension_column(FibreType::unclassified),
           {"fibres", files::member(&BatchRow::result, &R::n_fibres)},
           {"uncertain", files::member(&BatchRow::result, &R::n_uncertain)},
           result_column("relative_l2", &FitSummary::relative_l2),

@@ -176,7 +176,8 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
   if (asked == PrimaryMeasure::tension) {
     const Sample& sample = analysis.tensions().sample;
     const auto kind = std::ranges::find(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
-    return {analysis.find("tension_nN"), static_cast<int>(kind - sample.kinds.begin()),
+    return {kind == sample.kinds.end() ? nullptr : analysis.find("tension_nN"),
+            static_cast<int>(kind - sample.kinds.begin()),
             "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"};
   }
   const auto has_it = [&](CellKind kind) { return in_study(kind).columns.contains(asked); };

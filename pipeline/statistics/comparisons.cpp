@@ -175,9 +175,9 @@ Family with_medians(Family family) {
 
 std::vector<Family> families_of(const Sample& sample) {
   std::vector<Family> families;
-  for (int c = 0; c < sample.n_conditions() && sample.n_kinds() > 1; ++c) {
+  for (int c = 0; c < sample.n_conditions() && sample.n_compared > 1; ++c) {
     Family family{.question = Question::between_kinds, .within = sample.conditions[c]};
-    for (int k = 0; k < sample.n_kinds(); ++k)
+    for (int k = 0; k < sample.n_compared; ++k)
       family.groups.push_back({sample.kinds[k], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }

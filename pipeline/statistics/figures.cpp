@@ -33,7 +33,8 @@ std::string counts(const std::vector<Observation>& own, Observed each) {
 
 std::string colour_of(const Sample& sample, int condition, int kind) {
   if (sample.n_conditions() > 1) return condition_colour(condition);
-  return sample.each == Observed::fibres ? charts::colour_of(kFibreTypes[kind]) : condition_colour(kind);
+  return sample.each == Observed::fibres ? charts::colour_of(*named<FibreType>(sample.kinds[kind]))
+                                         : condition_colour(kind);
 }
 
 std::string counts_by_kind(const Sample& sample) {

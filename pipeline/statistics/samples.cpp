@@ -26,7 +26,7 @@ struct Value {
 struct MeasureRow {
   const char *column, *name, *unit;
   Observed each;
-  std::vector<std::string> kinds;  ///< empty: as they are met
+  std::vector<std::string> kinds;  ///< empty: as they are met; else others follow as they are met, not compared
   std::function<std::vector<Value>(const Study&, const StudyCell&)> of;
   bool is_never_negative = true;
 };
@@ -117,7 +117,7 @@ std::vector<MeasureRow> measure_table(int n_fibre_types) {
   using Q = SpaceFigures;
   std::vector<std::string> types;
   for (const FibreType type : kFibreTypes)
-    if (type != FibreType::edge || n_fibre_types > 3) types.emplace_back(name_of(type));
+    if (static_cast<int>(type) < n_fibre_types) types.emplace_back(name_of(type));
   std::vector<MeasureRow> table = {
       {"tension_nN", "tension", "nN", Observed::fibres, types, tensions_of},
       {"adhesion_force_nN",
@@ -191,6 +191,7 @@ Sample sample_of(const Study& study, const MeasureRow& row) {
                                .id = v.id});
     }
   }
+  sample.n_compared = row.kinds.empty() ? sample.n_kinds() : static_cast<int>(row.kinds.size());
   for (Observation& o : sample.values) o.group = sample.group_of(study.cells[o.cell].condition, o.kind);
   fill_in_errors(sample.values);
   return sample;

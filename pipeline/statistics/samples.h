@@ -28,6 +28,7 @@ struct Sample {
   std::string name, unit;  ///< for people
   Observed each = Observed::fibres;
   std::vector<std::string> kinds, conditions;
+  int n_compared = 0;  ///< of the kinds, the first: tests compare them with each other, and leave out the others
   std::vector<Observation> values = {};
   int n_without_error = 0;  ///< observations whose error is not known: that of the others is taken, or zero if none is
   bool is_never_negative = true;

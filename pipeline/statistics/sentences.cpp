@@ -83,7 +83,10 @@ void add_unanswered(const Measure& m, Findings& findings) {
         report::sentence("study.cannot-be-said", m.sample.name, name_of(m.sample.each), who,
                          m.model ? fmt::format("each needs values of two {}", m.sample.cells_name()) : m.obstacle));
   };
-  if (n_different(m.summaries, &Summary::kind) > 1)
+  std::set<int> compared;
+  for (const Observation& o : m.sample.values)
+    if (o.kind < m.sample.n_compared) compared.insert(o.kind);
+  if (compared.size() > 1)
     add(Question::between_kinds, m.sample.each == Observed::fibres   ? "types"
                                  : m.sample.each == Observed::sheets ? "parts"
                                                                      : "connected and unconnected ones");

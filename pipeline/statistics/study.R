@@ -12,6 +12,7 @@ fibres$condition[is.na(fibres$condition)] <- ""
 types$condition[is.na(types$condition)] <- ""
 if (!"edge" %in% types$type) fibres$type[fibres$type == "edge"] <- "ventral"
 known <- subset(fibres, identifiable %in% c(TRUE, "TRUE"))
+compared <- known$type != "unclassified" | "unclassified" %in% tests$group_b[tests$question == "between kinds"]
 
 largest <- 0
 compare <- function(what, here, there) {
@@ -37,6 +38,7 @@ for (i in seq_len(nrow(rank))) {
   row <- rank[i, ]
   within <- if (row$question == "between kinds") known$condition == row$within else known$type == row$within
   if (is.na(row$within) || row$within == "") within <- rep(TRUE, nrow(known))
+  if (row$question == "between kinds") within <- within & compared
   group <- if (row$question == "between kinds") known$type else known$condition
   if (row$test == "Kruskal-Wallis") {
     h <- kruskal.test(known$tension_nN[within], factor(group[within]))

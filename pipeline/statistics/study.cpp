@@ -252,7 +252,7 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.add("near_adhesion_um", parameters.near_adhesion_um, Range::size_um());
   list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000));
   list.add("bootstrap_seed", parameters.bootstrap_seed);
-  list.add("fibre_types", parameters.fibre_types, Range::between(3, 4));
+  list.add("fibre_types", parameters.fibre_types, Range::between(3, 5));
 }
 
 std::vector<double> thresholds_nN(const StudyParameters& parameters) {

@@ -119,7 +119,7 @@ struct Study {
   std::vector<StudyCell> cells = {};  ///< those that enter
   std::vector<LeftOutCell> left_out;
   Path folder = {};                        ///< names are relative to it
-  int n_fibre_types = 3;                   ///< 4: edge fibres are a type of their own; 3: they count as ventral
+  int n_fibre_types = 3;                   ///< 3: edge fibres count as ventral; 5: unclassified ones are compared
   std::vector<std::string> warnings = {};  ///< of the table of conditions and of the review
 
   /// Of a cell of that name; the study's own, if that is the only cell.

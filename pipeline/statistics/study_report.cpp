@@ -188,16 +188,24 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
   return html;
 }
 
-/// Which type edge fibres count as; empty without any.
-std::string on_edge_fibres(const Study& study) {
-  std::size_t n = 0;
-  for (const StudyCell& cell : study.cells)
-    n += static_cast<std::size_t>(
-        std::ranges::count_if(cell.cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; }));
-  if (n == 0) return "";
-  return report::note(
-      "study.edge-fibres", counted(n, "edge fibre runs along", "edge fibres run along"), n == 1 ? "is" : "are",
-      study.n_fibre_types < 4 ? report::sentence("study.edge-as-ventral") : "They are a type of their own.");
+/// What edge and unclassified fibres count as; empty without any.
+std::string on_fibre_types(const Study& study) {
+  std::ptrdiff_t n_edge = 0, n_unclassified = 0;
+  for (const StudyCell& cell : study.cells) {
+    n_edge += std::ranges::count(cell.cell.fibres, FibreType::edge, &Fibre::type);
+    n_unclassified += std::ranges::count(cell.cell.fibres, FibreType::unclassified, &Fibre::type);
+  }
+  std::string notes;
+  if (n_edge > 0)
+    notes += report::note(
+        "study.edge-fibres", counted(n_edge, "edge fibre runs along", "edge fibres run along"),
+        n_edge == 1 ? "is" : "are",
+        study.n_fibre_types < 4 ? report::sentence("study.edge-as-ventral") : "They are a type of their own.");
+  if (n_unclassified > 0)
+    notes += report::note(
+        "study.unclassified-fibres", counted(n_unclassified, "fibre is", "fibres are"),
+        study.n_fibre_types < 5 ? report::sentence("study.unclassified-listed") : "They are compared as a type.");
+  return notes;
 }
 
 /// "Stress-fibre tensions of 8 cells, contraction of 4 sheets and forces of 6 cells in space"
@@ -235,7 +243,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   for (const CellKind kind : kKindsOfCells)
     if (const char* text = in_study(kind).how_to_read; text != nullptr && !analysis.of_cells(kind).empty())
       how_to_read += report::note(text);
-  body += report::section("All measures", on_edge_fibres(study) + how_to_read + measures_table(files));
+  body += report::section("All measures", on_fibre_types(study) + how_to_read + measures_table(files));
   for (const Measure& m : analysis.measures)
     if (!m.comparisons.empty())
       tests += report::folded("Tests of the " + m.sample.name + " of " + name_of(m.sample.each),

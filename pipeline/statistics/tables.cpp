@@ -149,6 +149,7 @@ Columns<StudyCell> figure_columns() {
           {"converged", of_fit(&FitSummary::converged)},
           {"findings", [](const C& c) { return open_ids(c.findings); }},
           {"n_edge", n_fibres(FibreType::edge)},
+          {"n_unclassified", n_fibres(FibreType::unclassified)},
           {"model", [](const C& c) { return model_of(c); }},
           columns_of(&C::sheet, sheet_columns()),
           columns_of(&C::space, space_columns())};

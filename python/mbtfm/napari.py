@@ -19,9 +19,8 @@ Layer = Tuple[Any, Dict[str, Any], str]
 ReaderFunction = Callable[[Union[str, Sequence[str]]], List[Layer]]
 
 #: By type of fibre, as the report has them on images.
-COLOURS = {"dorsal": "#56b4ff", "arc": "#ffb728", "ventral": "#00d68f", "edge": "#ff7a52"}
+COLOURS = {"dorsal": "#56b4ff", "arc": "#ffb728", "ventral": "#00d68f", "edge": "#ff7a52", "unclassified": "#b8b8b8"}
 _CHANNELS = {"adhesion": "green", "actin": "gray", "beads_stressed": "red", "beads_relaxed": "cyan"}
-_TYPES = ("ventral", "dorsal", "arc", "edge")
 
 
 def reader(path: Union[str, Sequence[str]]) -> Optional[ReaderFunction]:
@@ -153,7 +152,7 @@ def _plain(table: pd.DataFrame) -> pd.DataFrame:
 
 def write_fibres(path: str, data: Any, meta: Dict[str, Any]) -> List[str]:
     """Save a layer of lines as fibres.zip for mbtfm. The feature `type` (ventral, dorsal, arc, edge) fixes how an end is held;
-    a line without it gets its type from where it ends.
+    a line without it gets its type from where it ends. An `unclassified` one stays so, held where it ends.
 
     The pixel size is that of the cell folder that the file is written to, or that the layer was read from.
     """
@@ -178,7 +177,7 @@ def write_fibres(path: str, data: Any, meta: Dict[str, Any]) -> List[str]:
 
 def _name_of(number: int, features: pd.DataFrame, index: int) -> str:
     kind = str(features["type"].iloc[index]) if "type" in features and index < len(features) else ""
-    return f"{kind} {number}" if kind in _TYPES else f"fibre {number}"
+    return f"{kind} {number}" if kind in COLOURS else f"fibre {number}"
 
 
 def _pixel_size_um(*folders: Any) -> float:

@@ -15,16 +15,9 @@ namespace {
 
 LogNormal tension_distribution(const TensionParameters& p, FibreType type) {
   const double low = p.smallest_tension_nN, high = p.largest_tension_nN;
-  switch (type) {
-    case FibreType::dorsal:
-      return {p.dorsal_median_nN, p.dorsal_log_sd, low, high};
-    case FibreType::arc:
-      return {p.arc_median_nN, p.arc_log_sd, low, high};
-    case FibreType::ventral:
-    case FibreType::edge:
-      return {p.ventral_median_nN, p.ventral_log_sd, low, high};
-  }
-  throw InternalError("unknown fibre type");
+  if (type == FibreType::dorsal) return {p.dorsal_median_nN, p.dorsal_log_sd, low, high};
+  if (type == FibreType::arc) return {p.arc_median_nN, p.arc_log_sd, low, high};
+  return {p.ventral_median_nN, p.ventral_log_sd, low, high};
 }
 
 /// Fibres and adhesions at random. Ventral fibres first: they are the longest and need the most room.

@@ -145,16 +145,9 @@ std::optional<Proposal> propose_arc(const Sketch& sketch, Random& random) {
 }
 
 std::optional<Proposal> propose(const Sketch& sketch, FibreType type, double tension_nN, Random& random) {
-  switch (type) {
-    case FibreType::ventral:
-    case FibreType::edge:
-      return propose_ventral(sketch, tension_nN, random);
-    case FibreType::dorsal:
-      return propose_dorsal(sketch, tension_nN, random);
-    case FibreType::arc:
-      return propose_arc(sketch, random);
-  }
-  throw InternalError("unknown fibre type");
+  if (type == FibreType::dorsal) return propose_dorsal(sketch, tension_nN, random);
+  if (type == FibreType::arc) return propose_arc(sketch, random);
+  return propose_ventral(sketch, tension_nN, random);
 }
 
 void accept(Sketch& sketch, Proposal proposal) {

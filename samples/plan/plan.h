@@ -28,6 +28,7 @@ enum class Quantity {
   arc,
   ventral,
   edge,
+  unclassified,
   network_force,
   total_force,
   adhesion_force,
@@ -35,12 +36,12 @@ enum class Quantity {
   fttc_force
 };
 constexpr auto words(Quantity) {
-  return std::array{
-      "fibre",         "dorsal fibre", "transverse arc", "ventral fibre",        "edge fibre",
-      "network force", "total force",  "adhesion force", "adhesion force alone", "adhesion force by FTTC"};
+  return std::array{"fibre",          "dorsal fibre",         "transverse arc",        "ventral fibre",
+                    "edge fibre",     "unclassified fibre",   "network force",         "total force",
+                    "adhesion force", "adhesion force alone", "adhesion force by FTTC"};
 }
-inline constexpr Quantity kOfTypes[] = {Quantity::dorsal, Quantity::arc, Quantity::ventral,
-                                        Quantity::edge};  ///< in the order of kFibreTypes
+inline constexpr Quantity kOfTypes[] = {Quantity::dorsal, Quantity::arc, Quantity::ventral, Quantity::edge,
+                                        Quantity::unclassified};  ///< in the order of kFibreTypes
 /// What is estimated in space. Of patches the plan gives the middle one.
 enum class SpaceQuantity { force, tangential_force, normal_force, total_force, net_force };
 constexpr auto words(SpaceQuantity) {

@@ -7,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/overlay.h"
+#include "segment/cells/report.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -37,12 +38,7 @@ struct Trial {
 };
 
 std::string outcome_of(const Segmentation& s) {
-  const auto n_of = [&](FibreType type) {
-    return std::to_string(
-        std::count_if(s.cell.fibres.begin(), s.cell.fibres.end(), [&](const Fibre& f) { return f.type == type; }));
-  };
-  return std::to_string(s.cell.adhesions.size()) + " adhesions, fibres: " + n_of(FibreType::ventral) + " ventral, " +
-         n_of(FibreType::dorsal) + " dorsal, " + n_of(FibreType::arc) + " arcs";
+  return std::to_string(s.cell.adhesions.size()) + " adhesions, fibres: " + types_in_words(s.cell.fibres);
 }
 
 Trial trial_of(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,

@@ -55,9 +55,6 @@ EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, do
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
               EndsToTie ends = {});
 
-/// No type is as probable as not. Straight pieces that no adhesion holds are of any type.
-inline bool is_unclassified(const Fibre& fibre) { return fibre.type_confidence < 0.5; }
-
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um);

@@ -146,7 +146,7 @@ std::optional<FibreType> stated_type(const rois::Roi& roi, const std::string& wh
     if (stated && type && *stated != *type) throw InputError(where, "one fibre type in its name", "two");
     if (stated) type = stated;
   }
-  const bool is_type = roi.group >= 1 && roi.group <= static_cast<int>(std::size(kFibreTypes));
+  const bool is_type = roi.group >= 1 && roi.group <= 1 + static_cast<int>(FibreType::edge);
   if (!type && is_type) type = kFibreTypes[roi.group - 1];
   return type;
 }
@@ -282,6 +282,8 @@ std::vector<Vec2> held_ends_um(const DrawnLine& line) {
 
 namespace {
 
+bool states_its_ends(const DrawnLine& line) { return line.stated && *line.stated != FibreType::unclassified; }
+
 /// Ends that may be tied. Of a dorsal fibre one: that which reaches an adhesion, as the program's own fibres are given
 /// back in either direction; its start where that does not tell.
 EndsToTie ends_of(const DrawnLine& line, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
@@ -333,6 +335,9 @@ Fibre held(DrawnLine line, std::vector<Adhesion>& all, const CellOutline& cell, 
   if (fibre.points_um.size() < 2)
     throw InputError(line.where, "a line from one adhesion to another or beyond", "one within a single adhesion");
   if (!line.stated) return fibre;
+  fibre.type = *line.stated;
+  fibre.type_reason = "named or grouped so by hand";
+  if (!states_its_ends(line)) return fibre;
   const auto hold = [&](bool is_asked, std::optional<int>& adhesion_id) {
     if (is_asked && !adhesion_id && !is_on_cut(fibre.points_um.back(), cuts))
       adhesion_id = add_anchor(fibre.points_um, all, cell, anchor_area_um2, line.where);
@@ -341,9 +346,7 @@ Fibre held(DrawnLine line, std::vector<Adhesion>& all, const CellOutline& cell, 
   std::reverse(fibre.points_um.begin(), fibre.points_um.end());
   hold(ends.start, fibre.start_adhesion_id);
   std::reverse(fibre.points_um.begin(), fibre.points_um.end());
-  fibre.type = *line.stated;
   fibre.type_confidence = 1;
-  fibre.type_reason = "named or grouped so by hand";
   return fibre;
 }
 
@@ -356,7 +359,7 @@ HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>
   // first those whose types ask for anchors, which then hold the others, too
   for (const bool is_stated : {true, false}) {
     for (std::size_t i = 0; i < lines.size(); ++i)
-      if (lines[i].stated.has_value() == is_stated)
+      if (states_its_ends(lines[i]) == is_stated)
         fibres[i] = held(std::move(lines[i]), all, cell, p, anchor_area_um2, cuts);
   }
   HeldFibres result;

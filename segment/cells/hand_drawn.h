@@ -52,7 +52,7 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
 struct DrawnLine {
   Fibre fibre;
   std::optional<FibreType>
-      stated;         ///< its type, by name ("dorsal 3", "Edge-12", "arc_1") or group (kFibreTypes, from 1)
+      stated;         ///< its type, by name ("dorsal 3", "Edge-12", "arc_1") or group (1 to 4: dorsal to edge)
   std::string where;  ///< names it in errors
 };
 /// Width and intensity from the image across the line, else its stroke or the typical width.
@@ -70,7 +70,8 @@ struct HeldFibres {
 };
 /// Fibres held as their type says: ventral and edge ones at both ends; a dorsal one at the end that reaches an
 /// adhesion, else, or where both do, at its start; an arc nowhere. Where no adhesion is in reach an anchor is made, but
-/// for ends on a cut. Of a line whose type is not stated the ends are tied to what they reach, which makes its type.
+/// for ends on a cut. Of a line whose type is not stated, or unclassified, the ends are tied to what they reach, which
+/// makes its type in the first case.
 /// @throws InputError naming the line whose end must be held and lies outside the cell, or that lies within an adhesion
 HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>& adhesions, const CellOutline& cell,
                        const FibreParameters& parameters, double anchor_area_um2, const Cuts& cuts = {});

@@ -12,7 +12,7 @@ namespace mbtfm::cells {
 namespace {
 
 const cv::Scalar kInk(15, 15, 15), kPaper(255, 255, 255);  // red, green, blue
-const cv::Scalar kLeftOut(190, 190, 190), kDoubtful(150, 150, 110), kUnclassified(230, 230, 230);
+const cv::Scalar kLeftOut(190, 190, 190), kDoubtful(150, 150, 110);
 constexpr double kRingDash_px = 7, kFibreDash_px = 22;
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kShift = 4;           // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
@@ -24,14 +24,12 @@ constexpr double kStemOfU = 4;  // px from the left of the letter's box at size 
 
 cv::Scalar scalar(Colour c) { return cv::Scalar(c.red, c.green, c.blue); }
 
-cv::Scalar colour_of_fibre(const Fibre& f) { return is_unclassified(f) ? kUnclassified : scalar(colour_of(f.type)); }
-
 /// The fainter, the less probable it is what it is drawn as.
 cv::Scalar faded(const cv::Scalar& colour, double probability) {
   constexpr double kFaintest = 0.3;
   return colour * (kFaintest + (1 - kFaintest) * probability);
 }
-cv::Scalar faded_colour(const Fibre& f) { return faded(colour_of_fibre(f), f.confidence); }
+cv::Scalar faded_colour(const Fibre& f) { return faded(scalar(colour_of(f.type)), f.confidence); }
 
 /// What does not lie in one of the things that are no part of the cell: a dead cell may be ten times as bright.
 cv::Mat without(const cv::Mat& values, const cv::Mat& is_left_out) {
@@ -192,8 +190,7 @@ void draw_labels(Canvas& canvas, const Cell& cell) {
   constexpr double kClear_px = 30;  // about a label's width
   for (const Fibre& f : cell.fibres)
     canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()),
-                 (is_unclassified(f) ? 'u' : letter_of(f.type)) + std::to_string(f.fibre_id), colour_of_fibre(f),
-                 kFibreText);
+                 letter_of(f.type) + std::to_string(f.fibre_id), scalar(colour_of(f.type)), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_corners(a, 16));
   std::vector<const Adhesion*> large_first;
   for (const Adhesion& a : cell.adhesions)
@@ -233,15 +230,12 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
   const Cell& cell = s.cell;
   std::vector<Entry> entries;
   for (const FibreType type : kFibreTypes) {
-    const auto n =
-        std::ranges::count_if(cell.fibres, [&](const Fibre& f) { return f.type == type && !is_unclassified(f); });
-    if (type == FibreType::edge && n == 0) continue;
+    const auto n = std::ranges::count(cell.fibres, type, &Fibre::type);
+    if (type >= FibreType::edge && n == 0) continue;
     entries.push_back(
         {std::string(name_of(type)) + " (" + letter_of(type) + ") " + std::to_string(n), scalar(colour_of(type))});
     entries.back().is_dashed = type == FibreType::edge;
   }
-  if (const auto n = std::ranges::count_if(cell.fibres, is_unclassified); n > 0)
-    entries.push_back({"unclassified (u) " + std::to_string(n), kUnclassified});
   const auto add_adhesions = [&](const std::string& name, bool is_dashed, const auto& is_one) {
     const auto n = std::ranges::count_if(cell.adhesions, is_one);
     if (n == 0 && !(cell.adhesions.empty() && !is_dashed)) return;

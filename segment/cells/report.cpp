@@ -103,6 +103,15 @@ void notice_doubts(const Segmentation& s, const SegmentParameters& parameters, b
   for (const std::string& sentence : s.unused) notice(Symptom::input_not_used, 1, {.at = sentence});
 }
 
+std::string types_in_words(const std::vector<Fibre>& fibres) {
+  using enum FibreType;
+  std::string words;
+  for (const FibreType type : {ventral, dorsal, arc, edge, unclassified})
+    if (const auto n = std::ranges::count(fibres, type, &Fibre::type); n > 0 || type < edge)
+      words += (words.empty() ? "" : ", ") + std::to_string(n) + " " + name_of(type) + (type == arc ? "s" : "");
+  return words;
+}
+
 StageReport report_of(const Segmentation& s) {
   StageReport report;
   const auto n_of = [&](FibreType type) { return std::int64_t(std::ranges::count(s.cell.fibres, type, &Fibre::type)); };
@@ -127,7 +136,7 @@ StageReport report_of(const Segmentation& s) {
                     {"n_dorsal", n_of(FibreType::dorsal)},
                     {"n_arc", n_of(FibreType::arc)},
                     {"n_edge", n_of(FibreType::edge)},
-                    {"n_unclassified", std::int64_t(std::ranges::count_if(s.cell.fibres, is_unclassified))},
+                    {"n_unclassified", n_of(FibreType::unclassified)},
                     {"fibre_length_um", length},
                     {"cell_area_um2", s.area_um2},
                     {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
@@ -147,10 +156,7 @@ StageReport report_of(const Segmentation& s) {
   report.summary = (n_seen > 0 || n_adhesions == 0 ? std::to_string(n_seen) + " adhesions, " : "") +
                    (n_candidates > 0 ? std::to_string(n_candidates) + " candidates for adhesions, " : "") +
                    (s.n_anchors > 0 ? std::to_string(s.n_anchors) + " anchors, " : "") +
-                   std::to_string(s.cell.fibres.size()) + " fibres (" + std::to_string(n_of(FibreType::ventral)) +
-                   " ventral, " + std::to_string(n_of(FibreType::dorsal)) + " dorsal, " +
-                   std::to_string(n_of(FibreType::arc)) + " arcs" +
-                   (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
+                   std::to_string(s.cell.fibres.size()) + " fibres (" + types_in_words(s.cell.fibres) + ")";
   if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
   if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;

@@ -14,6 +14,9 @@ namespace mbtfm::cells {
 StageReport report_of(const Segmentation& cell);
 StageReport report_of(const std::vector<Segmentation>& cells);
 
+/// "7 ventral, 3 dorsal, 2 arcs", and of the other types those that there are.
+std::string types_in_words(const std::vector<Fibre>& fibres);
+
 /// Which of its parts were drawn by hand.
 void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn);
 

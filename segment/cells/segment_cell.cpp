@@ -257,6 +257,8 @@ void hold(Cell& cell, std::vector<Adhesion> adhesions, Lines lines, const CellOu
   } else {
     cell.fibres = tied_one_by_one(std::move(lines.traced), cell, outline, in);
   }
+  for (Fibre& f : cell.fibres)
+    if (f.type_confidence < 0.5) f.type = FibreType::unclassified;
   for (Adhesion& a : cell.adhesions) a.edge_distance_um = distance_to_edge_um(cell, a.position_um);
 }
 

@@ -4,7 +4,6 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/files/csv.h"
-#include "segment/cells/fibre_ends.h"
 #include "tests/support/test.h"
 
 namespace mbtfm::test {
@@ -36,7 +35,7 @@ inline std::vector<LinePoint> line_points(const std::vector<Fibre>& fibres) {
       const double l = norm(d);
       for (; next < gone + l; next += kStep_um)
         points.push_back({a + ((next - gone) / l) * d, std::atan2(d.y, d.x),
-                          cells::is_unclassified(f) ? "" : std::string(name_of(f.type))});
+                          f.type == FibreType::unclassified ? "" : std::string(name_of(f.type))});
       gone += l;
     }
   }

@@ -85,8 +85,9 @@ inline Accuracy accuracy_of(const Cell& truth, const Cell& found) {
                      {"adhesion orientation error, median (deg)", kDegrees * median(a.angle_errors_rad)},
                      {"fibre centreline F1 (0.25 um)", l.f1()},
                      {"fibres in one piece", 1.0 * f.n_traced / std::max(1, f.n_true)},
-                     {"fibre type right", 1.0 * f.n_type_right / std::max(1, f.n_traced)},
-                     {"fibre type and adhesions right", 1.0 * f.n_typed / std::max(1, f.n_traced)},
+                     {"fibre unclassified", 1.0 * f.n_unclassified / std::max(1, f.n_traced)},
+                     {"fibre type right", 1.0 * f.n_type_right / std::max(1, f.n_traced - f.n_unclassified)},
+                     {"fibre type and adhesions right", 1.0 * f.n_typed / std::max(1, f.n_traced - f.n_unclassified)},
                      {"false fibres", 1.0 * f.n_false}};
   if (!found.outline_um.empty()) result["outline IoU"] = intersection_over_union(truth.outline_um, found.outline_um);
   return result;

@@ -137,10 +137,11 @@ inline LineScore score_lines(const std::vector<Fibre>& truth, const std::vector<
 }
 
 struct FibreScore {
-  int n_true = 0;        ///< longer than 4 um
-  int n_traced = 0;      ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
-  int n_type_right = 0;  ///< … and has the type
-  int n_typed = 0;       ///< … and is held by the very adhesions
+  int n_true = 0;          ///< longer than 4 um
+  int n_traced = 0;        ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
+  int n_unclassified = 0;  ///< … and has no type
+  int n_type_right = 0;    ///< … and has the type
+  int n_typed = 0;         ///< … and is held by the very adhesions
   int n_found = 0;
   int n_false = 0;            ///< found, and less than half of it near any true fibre
   std::vector<int> found_id;  ///< by true fibre; 0: none
@@ -165,6 +166,7 @@ inline FibreScore score_fibres(const Cell& truth, const Cell& found, const Adhes
       if (covered_share(t.points_um, f.points_um, kTolerance_um) < 0.8) continue;
       if (covered_share(f.points_um, t.points_um, kTolerance_um) < 0.8) continue;
       ++s.n_traced;
+      s.n_unclassified += f.type == FibreType::unclassified;
       s.n_type_right += t.type == f.type;
       const int a = translated(t.start_adhesion_id), b = translated(t.end_adhesion_id);
       const int c = f.start_adhesion_id.value_or(0), d = f.end_adhesion_id.value_or(0);

@@ -46,7 +46,7 @@ inline statistics::Study simulated_study(const StudySettings& s) {
     cell.cell.fibres.clear();
     cell.tensions.push_back({.fibre_id = 0, .tension_nN = 0.06});
     const double of_cell = s.cell_sd_nN * normal(random);
-    for (const FibreType type : kFibreTypes) {
+    for (const FibreType type : {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge}) {
       const double of_type = s.type_in_cell_sd_nN * normal(random);
       const double mean = s.types_differ ? (type == FibreType::dorsal ? 1.5 : type == FibreType::arc ? 2.5 : 4) : 2.5;
       const int n = std::poisson_distribution<int>(s.mean_fibres_by_type)(random);

@@ -297,26 +297,30 @@ TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
   EXPECT_TRUE(says(analyse(study, {}), "could not be identified"));
 }
 
-TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
+TEST(Study, edge_and_unclassified_fibres_are_listed_and_compared_as_types_if_asked) {
   const FakeStudy fake;
-  for (const int n_types : {3, 4}) {
-    Study study = fake.read({.fibre_types = n_types});
-    const std::vector<double> before = values_of(sample_of(study, "tension_nN").of_group(0, 2));
-    Fibre& ventral = *std::ranges::find(study.cells[0].cell.fibres, FibreType::ventral, &Fibre::type);
-    ventral.type = FibreType::edge;
-    const Sample sample = sample_of(study, "tension_nN");
-    EXPECT_EQ(sample.n_kinds(), n_types);
-    EXPECT_EQ(sample.values.size(), measured_fibres(study).size());
-    EXPECT_EQ(values_of(sample.of_group(0, 2)).size(), before.size() - (n_types == 4 ? 1 : 0));
-    EXPECT_EQ(n_types == 4 ? sample.of_group(0, 3).size() : 1u, 1u);
-    const auto tables = tables_of(study, analyse(study, {}));
-    const files::CsvTable cells(tables[0].second, "cells.csv");
-    EXPECT_EQ(cells.integer(0, "n_edge", 0), 1);
-    const StudyParameters parameters{.fibre_types = n_types};
+  for (const int n_types : {3, 4, 5}) {
+    const StudyParameters parameters{.primary_type = FibreType::unclassified, .fibre_types = n_types};
+    Study study = fake.read(parameters);
+    EXPECT_EQ(primary_choice(study, analyse(study, parameters), parameters).measure == nullptr, n_types < 5);
+    const std::size_t n_ventral = sample_of(study, "tension_nN").of_group(0, 2).size();
+    study.cells[0].cell.fibres[0].type = FibreType::edge;
+    for (StudyCell& cell : study.cells) cell.cell.fibres[3].type = FibreType::unclassified;
     const Analysis analysis = analyse(study, parameters);
-    const std::string page =
-        study_html(study, analysis, figures_of(study, analysis, parameters), parameters, "statistics");
-    EXPECT_TRUE(has_words(page, "1 edge fibre runs along"));
+    const Sample& sample = analysis.tensions().sample;
+    EXPECT_EQ(sample.values.size(), measured_fibres(study).size());
+    EXPECT_EQ(sample.of_group(0, 2).size(), n_ventral - (n_types > 3 ? 1 : 0));
+    EXPECT_EQ(n_types > 3 ? sample.of_group(0, 3).size() : 1u, 1u);
+    EXPECT_EQ(std::ranges::count(analysis.tensions().summaries, "unclassified", &Summary::kind), 1);
+    EXPECT_EQ(std::ranges::count(analysis.tensions().comparisons, "unclassified", &Comparison::group_b) > 0,
+              n_types == 5);
+    EXPECT_FALSE(primary_choice(study, analysis, parameters).measure == nullptr);
+    const files::CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
+    EXPECT_EQ(cells.integer(0, "n_edge", 0) + cells.integer(0, "n_unclassified", 0), 2);
+    const std::vector<Figure> figures = figures_of(study, analysis, parameters);
+    const std::string page = study_html(study, analysis, figures, parameters, "statistics");
+    EXPECT_TRUE(has_words(page, "1 edge fibre runs along", "4 fibres are unclassified"));
+    EXPECT_EQ(has_words(page, "no test compares them"), n_types < 5);
   }
 }
 
