@@ -39,8 +39,8 @@ namespace fs = std::filesystem;
 
 namespace mbtfm::test {
 
-/// Whether a text has all of these words, whether its lines may break at a space or not; if not, the first that it lacks,
-/// and the text.
+/// Whether a text has all of these words, whether its lines may break at a space or not; if not, the first that it
+/// lacks, and the text.
 template <class... Words>
 testing::AssertionResult has_words(std::string text, const Words&... words) {
   for (std::size_t at = 0; (at = text.find("\u00a0", at)) != text.npos;) text.replace(at, 2, " ");
