@@ -19,8 +19,8 @@ struct EdgeForces {
 };
 
 /// Of even forces on free places as near to the edge as three in four of the adhesions, inwards along its normal. Their
-/// sum a is expected in one cell of three, |N(0, τ²)|. τ is half of what adhesions too small to be found exert, of
-/// which their neighbours take over anything. With the score test's â and σ (search.h) and r = τ²/(τ² + σ²),
+/// sum a is expected in one cell of three, |N(0, τ²)|. τ is half the force of adhesions too small to be found: their
+/// neighbours may have taken over none or all of it. With the score test's â and σ (search.h) and r = τ²/(τ² + σ²),
 ///
 ///   B = 2 √(1 − r) exp(r â²/2σ²) Φ(√r â/σ),   probability = B / (2 + B).
 EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel);
