@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cctype>
 #include <regex>
 
@@ -40,23 +38,6 @@ std::string contents(const std::string& body) {
     links += "<a href=\"#" + id + "\">" + body.substr(title, body.find(kEnd, title) - title) + "</a>";
   }
   return "<nav>" + links + "</nav>\n";
-}
-
-/// A line of text does not break between a number and its unit.
-std::string with_units_held(const std::string& html) {
-  constexpr std::array<std::string_view, 6> kUnits = {"%", "nN", "µm", "kPa", "fJ", "nm"};
-  std::string held;
-  bool is_in_tag = false;
-  for (std::size_t i = 0; i < html.size(); ++i) {
-    is_in_tag = html[i] == '<' || (is_in_tag && html[i] != '>');
-    const auto is_next = [&](std::string_view unit) { return html.compare(i + 1, unit.size(), unit) == 0; };
-    const bool is_after_digit = i > 0 && html[i] == ' ' && std::isdigit(static_cast<unsigned char>(html[i - 1])) != 0;
-    if (is_after_digit && !is_in_tag && std::ranges::any_of(kUnits, is_next))
-      held += "\u00a0";
-    else
-      held += html[i];
-  }
-  return held;
 }
 
 }  // namespace
@@ -146,8 +127,7 @@ std::string html_of(const Page& page) {
          title + " – mbtfm</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n<h1>" + title +
          "</h1>" + line("what", page.what) +
          line("sub", page.sub + (page.sub.empty() ? "" : " · ") + "mbtfm " + std::string(kVersion)) +
-         contents(page.body) + with_units_held(page.body) + "</main><script>" + std::string(kScript) +
-         "</script>\n</body></html>\n";
+         contents(page.body) + page.body + "</main><script>" + std::string(kScript) + "</script>\n</body></html>\n";
 }
 
 }  // namespace mbtfm::report

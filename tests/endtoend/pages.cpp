@@ -108,7 +108,7 @@ TEST_F(Pages, the_mouse_reads_tensions_and_forces_with_their_errors) {
   }
   browser.mouse("mouseMoved", 1, 1);
   EXPECT_EQ(tip(browser), "");
-  rest_on(browser, "Where the errors come from", "ventral 2: 4 ± 0.5\u00a0nN\nmesh");
+  rest_on(browser, "Where the errors come from", "ventral 2: 4 ± 0.5 nN\nmesh");
   EXPECT_TRUE(has_words(tip(browser), "64 % of the squared error"));  // 0.4² / 0.5²
 }
 
