@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "pipeline/charts/box.h"
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/polyline.h"
@@ -96,19 +97,19 @@ void draw_fibre_ids(Chart& map, const CellResults& results) {
   std::vector<const Fibre*> order;
   for (const Fibre& fibre : results.cell.fibres) order.push_back(&fibre);
   std::ranges::stable_sort(order, std::greater{}, tension_nN);
-  std::vector<Vec2> taken;
+  std::vector<charts::Box> taken;
+  const auto box_at = [&](Vec2 place) {
+    return charts::box_around(place, kWidth_px * um_per_px, kHeight_px * um_per_px);
+  };
   const auto is_free = [&](Vec2 place) {
-    return std::ranges::none_of(taken, [&](Vec2 other) {
-      const Vec2 apart_px = 1 / um_per_px * (place - other);
-      return std::abs(apart_px.x) < kWidth_px && std::abs(apart_px.y) < kHeight_px;
-    });
+    return std::ranges::none_of(taken, [&](const charts::Box& other) { return overlap(box_at(place), other); });
   };
   for (const Fibre* fibre : order) {
     const auto places = label_places_um(*fibre, results.cell.fibres, 0.5 * kWidth_px * um_per_px);
     const auto free = std::ranges::find_if(places, is_free);
     if (free == places.end()) continue;
     map.label(*free, letter_of(fibre->type) + std::to_string(fibre->fibre_id));
-    taken.push_back(*free);
+    taken.push_back(box_at(*free));
   }
 }
 
