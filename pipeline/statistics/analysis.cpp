@@ -159,20 +159,11 @@ std::vector<const Measure*> Analysis::of_cells(CellKind kind) const {
   return list;
 }
 
-namespace {
-/// The kind that the study has most of; of equally many cells with fibres, then sheets.
-CellKind most_of(const Study& study) {
-  CellKind most = kKindsOfCells.front();
-  for (const CellKind kind : kKindsOfCells)
-    if (n_of_kind(study, kind) > n_of_kind(study, most)) most = kind;
-  return most;
-}
-}  // namespace
-
 PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
-  const CellKind most = most_of(study);
+  std::array kinds = kKindsOfCells;  // that of which the study has most comes first
+  std::ranges::stable_sort(kinds, std::greater{}, [&](CellKind kind) { return n_of_kind(study, kind); });
   PrimaryMeasure asked = parameters.primary;
-  if (asked == PrimaryMeasure::automatic) asked = in_study(most).primary;
+  if (asked == PrimaryMeasure::automatic) asked = in_study(kinds.front()).primary;
   if (asked == PrimaryMeasure::tension) {
     const Sample& sample = analysis.tensions().sample;
     const auto kind = std::ranges::find(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
@@ -180,14 +171,10 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
             static_cast<int>(kind - sample.kinds.begin()),
             "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"};
   }
-  const auto has_it = [&](CellKind kind) { return in_study(kind).columns.contains(asked); };
-  const auto is_there = [&](CellKind kind) { return has_it(kind) && n_of_kind(study, kind) > 0; };
-  auto kind = std::ranges::find_if(kKindsOfCells, is_there);
-  if (kind == kKindsOfCells.end()) kind = std::ranges::find_if(kKindsOfCells, has_it);
-  if (has_it(most)) kind = std::ranges::find(kKindsOfCells, most);
+  const CellKind kind = *std::ranges::find_if(kinds, [&](CellKind of) { return in_study(of).columns.contains(asked); });
   std::string name = name_of(asked);
   std::ranges::replace(name, '-', ' ');
-  return {analysis.find(in_study(*kind).columns.at(asked)), 0, name + " of " + traits_of(*kind).many};
+  return {analysis.find(in_study(kind).columns.at(asked)), 0, name + " of " + traits_of(kind).many};
 }
 
 Analysis analyse(const Study& study, const StudyParameters& parameters) {
