@@ -176,12 +176,12 @@ fs::path make_cell_of_picture(const fs::path& folder, int n) {
   text << kMade << toml::toml_formatter(toml) << "\n";
   const fs::path cell = folder_of(folder, n), file = cell / "cell.toml";
   fs::create_directories(cell);
-  const std::string before = files::is_file(file) ? files::read_text(file) : kMade;
-  if (!before.starts_with(kMade))
+  const bool is_there = files::is_file(file);
+  if (is_there && !is_made_for_picture(cell))
     throw UsageError(file.string() +
                      " is not a file that mbtfm made, and segment.cell = 0 would overwrite it: move the "
                      "folder elsewhere, or choose one cell (segment.cell)");
-  if (before != text.str()) files::write_whole(file, text.str());
+  if (!is_there || files::read_text(file) != text.str()) files::write_whole(file, text.str());
   return cell;
 }
 

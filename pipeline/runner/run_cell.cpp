@@ -92,8 +92,8 @@ class CellRun {
         given_(with(unset_in(cell_ / "cell.toml", beneath(options, of_)), options.set)),
         settings_(read_settings(cell_ / "cell.toml", of_.stages, given_)),
         hashes_(cell_) {
+    const bool is_made = !options.set.empty() && is_made_for_picture(cell_);
     for (const Setting& setting : options.set) {
-      const bool is_made = is_made_for_picture(cell_);
       if (setting == Setting{"segment", "cell", is_made ? setting.value : "0"})
         throw UsageError("--set segment.cell=" + setting.value +
                          ": each cell of a picture gets a folder and a cell.toml of its own; write cell = " +
