@@ -70,7 +70,8 @@ void draw_values(Chart& map, const Solution& solution, const Extent& frame, cons
   }
   map.put_key(Chart::KeySide::above);
   const std::vector<double> ticks = charts::ticks(low, low + range);
-  for (std::size_t k = 0; k<ticks.size(); k += ticks.size()> 3 ? 2 : 1)  // there is room for three
+  const std::size_t step = ticks.size() > 3 ? 2 : 1;  // there is room for three
+  for (std::size_t k = 0; k < ticks.size(); k += step)
     map.key(charts::readable(ticks[k]) + " " + unit,
             charts::hex(charts::colour_at(charts::ColourMap::plasma, (ticks[k] - low) / range)));
 }

@@ -33,8 +33,7 @@ Chosen chosen_in(const std::filesystem::path& toml) {
 std::optional<images::Channel> channel(const std::optional<std::filesystem::path>& given,
                                        const images::PlaneChoice& choice) {
   if (!given) return std::nullopt;
-  const std::string frame = files::is_folder(*given) ? frames_in(*given).front() : "";
-  const std::filesystem::path file = frame.empty() ? *given : *given / frame;
+  const std::filesystem::path file = files::is_folder(*given) ? *given / frames_in(*given).front() : *given;
   return images::Channel{.name = file.filename().string(), .image = images::read_image(file, choice)};
 }
 
