@@ -73,7 +73,6 @@ double unseen_nN(const std::vector<Adhesion>& adhesions, const VectorXd& forces_
     n_small += 1;
     small_nN += forces_nN.segment<2>(2 * static_cast<Index>(a)).norm();
   }
-  if (mean <= 0) return 0;    // areas that are all alike show no limit
   double low = -8, high = 0;  // of the smallest one, in standard deviations from the law's mean
   while (high - low > 1e-3) {
     const double h = 0.5 * (low + high), above = numerics::normal_above(h),
