@@ -377,7 +377,6 @@ Detection detect(std::vector<images::Image> slices, double detection_snr, const 
           .depth = volume.depth,
           .spots = fit.spots(),
           .shape = fit.shape(),
-          .noise = fit.noise(),
           .share_saturated = static_cast<double>(n_saturated) / static_cast<double>(volume.values.size())};
 }
 

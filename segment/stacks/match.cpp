@@ -211,7 +211,7 @@ class Matcher {
   };
   struct Found {
     int partner = -1;
-    double score = 0, similarity = 0, margin = 0;
+    double score = 0, margin = 0;
   };
 
   Tolerance tolerance(double strain) const { return {sigma_um_, sigma_z_um_, strain}; }
@@ -351,7 +351,7 @@ class Matcher {
       }
       if (score > best.score) {
         next = best.score;
-        best.partner = other, best.score = score, best.similarity = s;
+        best.partner = other, best.score = score;
       } else {
         next = std::max(next, score);
       }
@@ -377,7 +377,6 @@ class Matcher {
       Match& m = result_.matches[bead];
       m = {};
       if (found[bead].partner < 0) continue;
-      m.similarity = found[bead].similarity;
       const bool is_owner = owner[found[bead].partner] == static_cast<int>(bead);
       if (!is_owner || found[bead].margin < kMargin) {
         m.flag = TrackFlag::ambiguous;

@@ -154,7 +154,7 @@ SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
   const int n = 1 + 4 * n_spots;
   std::array<double, kMost * kMost> normal{}, spread{};
   std::array<double, kMost> right{}, row{};
-  double sum_weight = 0, sum_squares = 0, light = 0, light_saturated = 0;
+  double light = 0, light_saturated = 0;
   for_each_voxel(box, [&](const Voxel& at) {
     row[0] = 1;
     double all_light = 0;
@@ -180,7 +180,6 @@ SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
       for (int b = 0; b <= a; ++b) normal[a * kMost + b] += va * row[b];
     }
     if (!with_errors) return;
-    sum_weight += in_window, sum_squares += in_window * value * value / variance;
     for (int a = 0; a < n; ++a) {
       const double va = v * v * variance * row[a];
       for (int b = 0; b <= a; ++b) spread[a * kMost + b] += va * row[b];
@@ -207,7 +206,6 @@ SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
     const Matrix half = factor.solve(m), covariance = factor.solve(half.transpose());
     result.spot.sigma = to_widths * w.xy * std::sqrt(0.5 * std::max(0.0, covariance(2, 2) + covariance(3, 3)));
     result.spot.sigma_z = to_widths * w.z * std::sqrt(std::max(0.0, covariance(4, 4)));
-    result.spot.misfit = sum_weight > 0 ? sum_squares / sum_weight : 1;
     return result;
   }
   const auto held = [&](double by) { return std::clamp(by * to_widths, -kStep, kStep); };

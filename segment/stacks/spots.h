@@ -79,7 +79,6 @@ struct Spot {
   Vec3 place;
   double height = 0;              ///< of its picture above its surroundings
   double sigma = 0, sigma_z = 0;  ///< standard errors (px, slices)
-  double misfit = 1;              ///< mean square of what the fit leaves, over the noise
   double share_saturated = 0;     ///< of its picture's light
 };
 
@@ -102,7 +101,7 @@ class SpotFit {
   void measure_shape();
   /// The variance in proportion to light from what the fit leaves.
   void measure_noise();
-  /// Standard errors and misfit.
+  /// Standard errors.
   void measure_errors();
 
   const std::vector<Spot>& spots() const { return spots_; }
@@ -131,7 +130,6 @@ struct Detection {
   int width = 0, height = 0, depth = 0;
   std::vector<Spot> spots;
   SpotShape shape;
-  Noise noise;
   double share_saturated = 0;  ///< of the voxels
 
   Widths widths_in_the_middle() const { return shape.at({0.5 * width, 0.5 * height, 0.5 * depth}); }

@@ -43,7 +43,6 @@ struct RigidMotion {
 struct Match {
   int partner = -1;  ///< in the stressed stack; -1: none
   TrackFlag flag = TrackFlag::no_partner;
-  double similarity = 0;                ///< share of the neighbours that are met with again
   Vec3 from_neighbours_um;              ///< displacement less that which the neighbours tell
   double sigma_um = 0, sigma_z_um = 0;  ///< of that difference, by the standard errors of all of them
   bool has_neighbours = false;
