@@ -51,13 +51,27 @@ double overlap(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
+/// A Gaussian average of 0.8 or 1.6 widths.
 struct Average {
+  Widths widths;
   std::vector<float> xy, z;
-  explicit Average(Widths w) : xy(weights_of(w.xy)), z(weights_of(w.z)) {}
+  Average(Widths spot, double by)
+      : widths{by * spot.xy, by * spot.z}, xy(weights_of(widths.xy)), z(weights_of(widths.z)) {}
   /// Height of its answer to a spot of height 1.
-  static double answer(Widths spot, Widths w) {
+  double answer(Widths spot) const {
     const double s = spot.xy * spot.xy, sz = spot.z * spot.z;
-    return s / (s + w.xy * w.xy) * std::sqrt(sz / (sz + w.z * w.z));
+    return s / (s + widths.xy * widths.xy) * std::sqrt(sz / (sz + widths.z * widths.z));
+  }
+  /// Of one slice; beyond the first and the last one they are mirrored.
+  beads::Plane of(const Volume& volume, int slice) const {
+    beads::Plane mean{volume.width, volume.height, {}};
+    mean.values.resize(static_cast<std::size_t>(volume.width) * volume.height);
+    const auto reach = static_cast<int>(z.size()) - 1;
+    for (int l = -reach; l <= reach; ++l) {
+      const float *from = volume.row(0, mirrored(slice + l, volume.depth)), weight = z[std::abs(l)];
+      for (std::size_t v = 0; v < mean.values.size(); ++v) mean.values[v] += weight * from[v];
+    }
+    return beads::blurred(mean, widths.xy);
   }
 };
 
@@ -66,52 +80,17 @@ double product(const Average& a, const Average& b) {
   return across * across * overlap(a.z, b.z);
 }
 
-/// A block of the volume, of all slices.
-struct Block {
-  int nx, ny, nz;
-  std::vector<float> values;
-  float* row(int j, int k) { return values.data() + (static_cast<std::size_t>(k) * ny + j) * nx; }
-  const float* row(int j, int k) const { return values.data() + (static_cast<std::size_t>(k) * ny + j) * nx; }
+/// A slice: its average, and what that has beyond the wider one.
+struct Band {
+  beads::Plane light, answer;
 };
 
-void add_row(float* to, const float* from, float weight, int n) {
-  for (int i = 0; i < n; ++i) to[i] += weight * from[i];
-}
-
-/// Averaged along x, y and z. In x and y the margin of the kernel's reach is left unfinished; z is mirrored.
-Block averaged(const Block& block, const Average& by) {
-  const int nx = block.nx, ny = block.ny, nz = block.nz;
-  const auto reach = static_cast<int>(by.xy.size()) - 1, reach_z = static_cast<int>(by.z.size()) - 1;
-  Block result{nx, ny, nz, std::vector<float>(block.values.size())};
-  Block slice{nx, ny, 1, std::vector<float>(static_cast<std::size_t>(nx) * ny)};
-  for (int k = 0; k < nz; ++k) {
-    std::ranges::fill(slice.values, 0.0f);
-    for (int l = -reach_z; l <= reach_z; ++l) {
-      const float* from = block.row(0, mirrored(k + l, nz));
-      add_row(slice.row(0, 0), from, by.z[std::abs(l)], nx * ny);
-    }
-    std::vector<float> along_x(static_cast<std::size_t>(nx) * ny);
-    for (int j = 0; j < ny; ++j) {
-      float* to = along_x.data() + static_cast<std::size_t>(j) * nx + reach;
-      for (int l = -reach; l <= reach; ++l)
-        add_row(to, slice.row(j, 0) + reach + l, by.xy[std::abs(l)], nx - 2 * reach);
-    }
-    for (int j = reach; j < ny - reach; ++j) {
-      for (int l = -reach; l <= reach; ++l) {
-        const float* from = along_x.data() + static_cast<std::size_t>(j + l) * nx;
-        add_row(result.row(j, k), from, by.xy[std::abs(l)], nx);
-      }
-    }
-  }
-  return result;
-}
-
-/// Of equal voxels the first counts.
-bool is_peak(const Block& block, int i, int j, int k) {
-  const float value = block.row(j, k)[i];
+/// In a slice and the two beside it. Of equal voxels the first counts.
+bool is_peak(const Band* slice, int i, int j) {
+  const float value = slice->answer.at(i, j);
   for (int dk = -1; dk <= 1; ++dk) {
     for (int dj = -1; dj <= 1; ++dj) {
-      const float* row = block.row(j + dj, k + dk) + i;
+      const float* row = slice[dk].answer.row(j + dj) + i;
       for (int di = -1; di <= 1; ++di) {
         if (di == 0 && dj == 0 && dk == 0) continue;
         const bool is_before = dk < 0 || (dk == 0 && (dj < 0 || (dj == 0 && di < 0)));
@@ -124,53 +103,42 @@ bool is_peak(const Block& block, int i, int j, int k) {
 
 /// Maxima of the difference of two Gaussian averages, of 0.8 and 1.6 widths along each axis, where they stand out of
 /// the noise, that of the light there included, by `detection_snr`: the first average keeps touching beads apart, the
-/// second takes away what is wider than a bead. The volume is filtered in columns, so that little memory is taken.
+/// second takes away what is wider than a bead. Some slices at a time, so that little memory is taken.
 std::vector<Peak> peaks_of(const Volume& volume, Widths w, const Noise& noise, double detection_snr, int threads) {
   if (volume.depth < 3) return {};
-  const Widths narrow_widths{0.8 * w.xy, 0.8 * w.z}, wide_widths{1.6 * w.xy, 1.6 * w.z};
-  const Average narrow(narrow_widths), wide(wide_widths);
+  const Average narrow(w, 0.8), wide(w, 1.6);
   const double gain = std::sqrt(product(narrow, narrow) - 2 * product(narrow, wide) + product(wide, wide));
-  const double answer = Average::answer(w, narrow_widths) - Average::answer(w, wide_widths);
-  const int margin = static_cast<int>(wide.xy.size());  // its reach, and one for the peaks
-  constexpr int kSide = 128;
-  const int columns = (volume.width + kSide - 1) / kSide, rows = (volume.height + kSide - 1) / kSide;
-  std::vector<std::vector<Peak>> found(static_cast<std::size_t>(columns) * rows);
-  numerics::parallel_for(columns * rows, threads, [&](int number) {
-    const int left = number % columns * kSide, top = number / columns * kSide;
-    const int right = std::min(volume.width, left + kSide), bottom = std::min(volume.height, top + kSide);
-    Block block{right - left + 2 * margin, bottom - top + 2 * margin, volume.depth, {}};
-    block.values.resize(static_cast<std::size_t>(block.nx) * block.ny * block.nz);
-    for (int k = 0; k < block.nz; ++k) {
-      for (int j = 0; j < block.ny; ++j) {
-        const float* from = volume.row(mirrored(top - margin + j, volume.height), k);
-        float* to = block.row(j, k);
-        for (int i = 0; i < block.nx; ++i) to[i] = from[mirrored(left - margin + i, volume.width)];
-      }
+  const double height_by_answer = 1 / (narrow.answer(w) - wide.answer(w));
+  constexpr int kSlices = 8;
+  std::vector<std::vector<Peak>> found(static_cast<std::size_t>((volume.depth - 2 + kSlices - 1) / kSlices));
+  numerics::parallel_for(static_cast<int>(found.size()), threads, [&](int part) {
+    const int first = 1 + part * kSlices, end = std::min(volume.depth - 1, first + kSlices);
+    std::vector<Band> bands;
+    for (int k = first - 1; k <= end; ++k) {
+      bands.push_back({narrow.of(volume, k), wide.of(volume, k)});
+      auto& [light, answer] = bands.back();
+      for (std::size_t v = 0; v < answer.values.size(); ++v) answer.values[v] = light.values[v] - answer.values[v];
     }
-    const Block light = averaged(block, narrow);
-    Block answers = averaged(block, wide);
-    for (std::size_t v = 0; v < answers.values.size(); ++v) answers.values[v] = light.values[v] - answers.values[v];
-    for (int k = 1; k + 1 < volume.depth; ++k) {
-      const auto least = static_cast<float>(detection_snr * gain * std::sqrt(noise.variance(k, 0)));
-      for (int y = std::max(1, top); y < std::min(bottom, volume.height - 1); ++y) {
-        const int j = y - top + margin;
-        const float* row = answers.row(j, k);
-        for (int x = std::max(1, left); x < std::min(right, volume.width - 1); ++x) {
-          const int i = x - left + margin;
-          if (!(row[i] > least) || !is_peak(answers, i, j, k)) continue;
-          const float here = row[i];
-          if (here < detection_snr * gain * std::sqrt(noise.variance(k, light.row(j, k)[i]))) continue;
-          found[number].push_back(
-              {{x + beads::parabola_vertex(row[i - 1], here, row[i + 1]),
-                y + beads::parabola_vertex(answers.row(j - 1, k)[i], here, answers.row(j + 1, k)[i]),
-                k + beads::parabola_vertex(answers.row(j, k - 1)[i], here, answers.row(j, k + 1)[i])},
-               here / answer});
+    for (int k = first; k < end; ++k) {
+      const Band* slice = &bands[k - first + 1];
+      const auto least = [&](double light) { return detection_snr * gain * std::sqrt(noise.variance(k, light)); };
+      const auto least_in_dark = static_cast<float>(least(0));
+      for (int y = 1; y + 1 < volume.height; ++y) {
+        const float* row = slice->answer.row(y);
+        for (int x = 1; x + 1 < volume.width; ++x) {
+          const float here = row[x];
+          if (!(here > least_in_dark) || !is_peak(slice, x, y) || here < least(slice->light.at(x, y))) continue;
+          const auto vertex = [&](float before, float after) { return beads::parabola_vertex(before, here, after); };
+          found[part].push_back(
+              {{x + vertex(row[x - 1], row[x + 1]), y + vertex(slice->answer.at(x, y - 1), slice->answer.at(x, y + 1)),
+                k + vertex(slice[-1].answer.at(x, y), slice[1].answer.at(x, y))},
+               here * height_by_answer});
         }
       }
     }
   });
   std::vector<Peak> peaks;
-  for (const std::vector<Peak>& of_block : found) peaks.insert(peaks.end(), of_block.begin(), of_block.end());
+  for (const std::vector<Peak>& of_part : found) peaks.insert(peaks.end(), of_part.begin(), of_part.end());
   return peaks;
 }
 
