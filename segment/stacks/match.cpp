@@ -95,7 +95,10 @@ double similarity_of(const Eigen::Vector3f* a, int n_a, const Eigen::Vector3f* b
   return sum / static_cast<float>(n_a);
 }
 
-constexpr int kMostAround = 21;
+/// Of what neighbours leave.
+double across_um(const Match& m) { return std::hypot(m.from_neighbours_um.x, m.from_neighbours_um.y); }
+
+constexpr int kMostAround = 21;  // the bead itself among them
 
 /// Displacement about a place as an affine function, by robust least squares over beads.
 struct LocalMotion {
@@ -111,8 +114,8 @@ LocalMotion local_motion(Vec3 place, const std::vector<Moved>& samples, double s
   constexpr int kFewest = 6;  // for an affine map one knows more than four points of
   const auto n = static_cast<int>(samples.size());
   if (n < kFewest) return motion;
-  MBTFM_ASSERT(n <= kMostAround);
   constexpr int kMost = kMostAround;  // on the stack: this is called for each bead, over and over
+  MBTFM_ASSERT(n <= kMost);
   Eigen::Matrix<double, Eigen::Dynamic, 4, 0, kMost, 4> x(n, 4);
   Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMost, 3> u(n, 3), left(n, 3);
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1> weight(n), certainty(n);
@@ -192,11 +195,12 @@ class Matcher {
     assign([&](std::size_t bead) { return look(bead, expected_of_all(bead), reach, kUnknownStrain, kLeast); });
     constexpr int kPasses = 3;
     for (int pass = 0; pass < kPasses; ++pass) {
-      drop_contradicting();
+      judge();
       measure_light();
       follow_neighbours();
     }
-    verify();
+    judge();
+    judge();  // once more, by the good ones alone
     return std::move(result_);
   }
 
@@ -214,11 +218,9 @@ class Matcher {
     double score = 0, margin = 0;
   };
 
-  Tolerance tolerance(double strain) const { return {sigma_um_, sigma_z_um_, strain}; }
-
   double similarity(std::size_t bead, std::size_t partner, const Eigen::Matrix3d& strain, double slack) const {
     return similarity_of(around_relaxed_.of(bead), around_relaxed_.n, around_stressed_.of(partner), around_stressed_.n,
-                         strain.cast<float>(), tolerance(slack));
+                         strain.cast<float>(), {sigma_um_, sigma_z_um_, slack});
   }
 
   // --- where to look first
@@ -313,14 +315,11 @@ class Matcher {
       motion.turn_rad = std::atan2(across, along);
       motion.centre = from;
       motion.shift_um = to - from;
-      std::vector<double> off;
-      for (const Vote& v : votes) off.push_back(norm(v.to - motion.at(v.from)));
-      const double limit = 3 * numerics::median(off) + sigma_z_um_;
-      std::vector<Vote> kept;
-      for (std::size_t k = 0; k < votes.size(); ++k) {
-        if (off[k] < limit) kept.push_back(votes[k]);
-      }
-      votes = std::move(kept);
+      const auto off = [&](const Vote& v) { return norm(v.to - motion.at(v.from)); };
+      std::vector<double> all_off;
+      for (const Vote& v : votes) all_off.push_back(off(v));
+      const double limit = 3 * numerics::median_in(all_off) + sigma_z_um_;
+      std::erase_if(votes, [&](const Vote& v) { return !(off(v) < limit); });
     }
   }
 
@@ -400,59 +399,46 @@ class Matcher {
     near_good_ = numerics::Near(places, spacing_um_);
   }
 
-  Vec3 displacement(std::size_t bead) const {
-    const Match& m = result_.matches[bead];
-    return stressed_.beads[m.partner].position_um - relaxed_.beads[bead].position_um;
-  }
-
   Moved sample_of(std::size_t bead) const {
     const PlacedBead &a = relaxed_.beads[bead], &b = stressed_.beads[result_.matches[bead].partner];
-    return {a.position_um, displacement(bead), std::hypot(a.sigma_um, b.sigma_um),
+    return {a.position_um, b.position_um - a.position_um, std::hypot(a.sigma_um, b.sigma_um),
             std::hypot(a.sigma_z_um, b.sigma_z_um)};
   }
 
   /// From the good beads around one, without itself.
-  LocalMotion motion_around(std::size_t bead, int n) const {
+  LocalMotion motion_around(std::size_t bead) const {
     std::vector<Moved> samples;
-    for (const int k : near_good_.nearest(relaxed_.beads[bead].position_um, n + 1)) {
+    for (const int k : near_good_.nearest(relaxed_.beads[bead].position_um, kMostAround)) {
       const auto other = static_cast<std::size_t>(good_[k]);
       if (other != bead) samples.push_back(sample_of(other));
     }
     return local_motion(relaxed_.beads[bead].position_um, samples, spacing_um_);
   }
 
-  static constexpr int kAround = 20;
-
-  /// How far a bead's displacement is from what its neighbours tell, in standard deviations of both.
-  double contradiction(std::size_t bead, const LocalMotion& around) const {
-    const Moved own = sample_of(bead);
-    const Eigen::Vector3d off = as_eigen(own.displacement_um) - around.at_place;
-    const double across = own.sigma_um * own.sigma_um + around.variance + around.scatter_um * around.scatter_um;
-    const double along =
-        own.sigma_z_um * own.sigma_z_um + around.variance_z + around.scatter_z_um * around.scatter_z_um;
-    return std::sqrt((off[0] * off[0] + off[1] * off[1]) / across + off[2] * off[2] / along);
-  }
-
-  /// Of three components; one is beyond t as often as three are beyond t + 0.65, about t = 4.
-  double limit() const { return parameters_.outlier_threshold + 0.65; }
-
-  void drop_contradicting() {
-    std::vector<char> is_bad(result_.matches.size());
-    std::vector<double> across(good_.size()), along(good_.size());
-    numerics::parallel_for_each(good_.size(), threads_, [&](std::size_t k) {
-      const auto bead = static_cast<std::size_t>(good_[k]);
-      const LocalMotion around = motion_around(bead, kAround);
-      is_bad[bead] = !around.is_sound || contradiction(bead, around) > limit();
-      const Eigen::Vector3d off = as_eigen(displacement(bead)) - around.at_place;
-      across[k] = std::hypot(off[0], off[1]), along[k] = std::abs(off[2]);
+  /// Flag what is further from its neighbours' motion than standard deviations of both explain.
+  void judge() {
+    // of three components; one is beyond t as often as three are beyond t + 0.65, about t = 4
+    const double limit = parameters_.outlier_threshold + 0.65;
+    numerics::parallel_for_each(result_.matches.size(), threads_, [&](std::size_t bead) {
+      Match& m = result_.matches[bead];
+      if (m.partner < 0) return;
+      const LocalMotion around = motion_around(bead);
+      const Moved own = sample_of(bead);
+      m.from_neighbours_um = own.displacement_um - as_vec(around.at_place);
+      m.sigma_um = std::sqrt(own.sigma_um * own.sigma_um + around.variance);
+      m.sigma_z_um = std::sqrt(own.sigma_z_um * own.sigma_z_um + around.variance_z);
+      const double across = across_um(m) / std::hypot(m.sigma_um, around.scatter_um),
+                   along = m.from_neighbours_um.z / std::hypot(m.sigma_z_um, around.scatter_z_um);
+      const bool agrees = around.is_sound && std::hypot(across, along) <= limit;
+      m.flag = agrees ? TrackFlag::none : TrackFlag::neighbours_disagree;
     });
     // places may be less exact than they claim, or claim nothing
+    std::vector<double> across, along;
+    for (const Match& m : result_.matches)
+      if (m.partner >= 0) across.push_back(across_um(m)), along.push_back(std::abs(m.from_neighbours_um.z));
     if (!across.empty()) {
-      sigma_um_ = std::max(sigma_um_, 1.5 * numerics::median(across));
-      sigma_z_um_ = std::max(sigma_z_um_, 3 * numerics::median(along));
-    }
-    for (std::size_t bead = 0; bead < is_bad.size(); ++bead) {
-      if (is_bad[bead]) result_.matches[bead].flag = TrackFlag::neighbours_disagree;
+      sigma_um_ = std::max(sigma_um_, 1.5 * numerics::median_in(across));
+      sigma_z_um_ = std::max(sigma_z_um_, 3 * numerics::median_in(along));
     }
     gather_good();
   }
@@ -475,33 +461,12 @@ class Matcher {
     is_nearby_ = true;
     constexpr double kSlack = 0.05, kReach = 0.8, kLeastNearby = 0.5;
     assign([&](std::size_t bead) {
-      const LocalMotion around = motion_around(bead, kAround);
+      const LocalMotion around = motion_around(bead);
       if (!around.is_sound) return Found{};
       const Expected expected{relaxed_.beads[bead].position_um + as_vec(around.at_place),
                               Eigen::Matrix3d::Identity() + around.gradient};
       return look(bead, expected, kReach * spacing_um_ + 4 * sigma_z_um_, kSlack, kLeastNearby);
     });
-  }
-
-  void verify() {
-    drop_contradicting();
-    std::vector<LocalMotion> motions(result_.matches.size());
-    numerics::parallel_for_each(result_.matches.size(), threads_, [&](std::size_t bead) {
-      if (result_.matches[bead].partner >= 0) motions[bead] = motion_around(bead, kAround);
-    });
-    for (std::size_t bead = 0; bead < motions.size(); ++bead) {
-      Match& m = result_.matches[bead];
-      if (m.partner < 0 || !motions[bead].is_sound) continue;
-      const bool agrees = contradiction(bead, motions[bead]) <= limit();
-      if (m.flag == TrackFlag::none && !agrees) m.flag = TrackFlag::neighbours_disagree;
-      if (m.flag == TrackFlag::neighbours_disagree && agrees) m.flag = TrackFlag::none;
-      const Moved own = sample_of(bead);
-      m.has_neighbours = true;
-      m.from_neighbours_um = own.displacement_um - as_vec(motions[bead].at_place);
-      m.sigma_um = std::sqrt(own.sigma_um * own.sigma_um + motions[bead].variance);
-      m.sigma_z_um = std::sqrt(own.sigma_z_um * own.sigma_z_um + motions[bead].variance_z);
-    }
-    gather_good();
   }
 
   MatchParameters parameters_;

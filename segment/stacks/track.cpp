@@ -67,7 +67,7 @@ Agreement agreement_of(const std::vector<PlacedBead>& relaxed, const std::vector
   std::vector<std::size_t> good;
   for (std::size_t k = 0; k < matches.size(); ++k) {
     const Match& m = matches[k];
-    if (m.flag != TrackFlag::none || !m.has_neighbours) continue;
+    if (m.flag != TrackFlag::none) continue;
     across.push_back(std::hypot(m.from_neighbours_um.x, m.from_neighbours_um.y));
     along.push_back(std::abs(m.from_neighbours_um.z));
     good.push_back(k);

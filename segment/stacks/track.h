@@ -45,7 +45,6 @@ struct Match {
   TrackFlag flag = TrackFlag::no_partner;
   Vec3 from_neighbours_um;              ///< displacement less that which the neighbours tell
   double sigma_um = 0, sigma_z_um = 0;  ///< of that difference, by the standard errors of all of them
-  bool has_neighbours = false;
 };
 
 struct Matching {
