@@ -17,15 +17,8 @@
 namespace mbtfm::stacks {
 namespace {
 
-/// A maximum of the band-passed volume, between voxels.
-struct Peak {
-  Vec3 place;
-  double height = 0;  ///< of a spot that answers so
-};
-
-/// Where a coordinate lies that is mirrored in the first and last voxel.
+/// Where a coordinate lies that is mirrored in the first and last of two voxels or more.
 int mirrored(int at, int n) {
-  if (n == 1) return 0;
   const int period = 2 * (n - 1), m = ((at % period) + period) % period;
   return m < n ? m : period - m;
 }
@@ -101,16 +94,16 @@ bool is_peak(const Band* slice, int i, int j) {
   return true;
 }
 
-/// Maxima of the difference of two Gaussian averages, of 0.8 and 1.6 widths along each axis, where they stand out of
-/// the noise, that of the light there included, by `detection_snr`: the first average keeps touching beads apart, the
-/// second takes away what is wider than a bead. Some slices at a time, so that little memory is taken.
-std::vector<Peak> peaks_of(const Volume& volume, Widths w, const Noise& noise, double detection_snr, int threads) {
+/// Maxima, between voxels, of the difference of two Gaussian averages, of 0.8 and 1.6 widths along each axis, if they
+/// stand out of the noise, that of the light there included, by `detection_snr`: the first average keeps touching beads
+/// apart, the second takes away what is wider than a bead. Some slices at a time, so that little memory is taken.
+std::vector<Spot> peaks_of(const Volume& volume, Widths w, const Noise& noise, double detection_snr, int threads) {
   if (volume.depth < 3) return {};
   const Average narrow(w, 0.8), wide(w, 1.6);
   const double gain = std::sqrt(product(narrow, narrow) - 2 * product(narrow, wide) + product(wide, wide));
   const double height_by_answer = 1 / (narrow.answer(w) - wide.answer(w));
   constexpr int kSlices = 8;
-  std::vector<std::vector<Peak>> found(static_cast<std::size_t>((volume.depth - 2 + kSlices - 1) / kSlices));
+  std::vector<std::vector<Spot>> found(static_cast<std::size_t>((volume.depth - 2 + kSlices - 1) / kSlices));
   numerics::parallel_for(static_cast<int>(found.size()), threads, [&](int part) {
     const int first = 1 + part * kSlices, end = std::min(volume.depth - 1, first + kSlices);
     std::vector<Band> bands;
@@ -129,16 +122,16 @@ std::vector<Peak> peaks_of(const Volume& volume, Widths w, const Noise& noise, d
           const float here = row[x];
           if (!(here > least_in_dark) || !is_peak(slice, x, y) || here < least(slice->light.at(x, y))) continue;
           const auto vertex = [&](float before, float after) { return beads::parabola_vertex(before, here, after); };
-          found[part].push_back(
-              {{x + vertex(row[x - 1], row[x + 1]), y + vertex(slice->answer.at(x, y - 1), slice->answer.at(x, y + 1)),
-                k + vertex(slice[-1].answer.at(x, y), slice[1].answer.at(x, y))},
-               here * height_by_answer});
+          found[part].push_back({.place = {x + vertex(row[x - 1], row[x + 1]),
+                                           y + vertex(slice->answer.at(x, y - 1), slice->answer.at(x, y + 1)),
+                                           k + vertex(slice[-1].answer.at(x, y), slice[1].answer.at(x, y))},
+                                 .height = here * height_by_answer});
         }
       }
     }
   });
-  std::vector<Peak> peaks;
-  for (const std::vector<Peak>& of_part : found) peaks.insert(peaks.end(), of_part.begin(), of_part.end());
+  std::vector<Spot> peaks;
+  for (const std::vector<Spot>& of_part : found) peaks.insert(peaks.end(), of_part.begin(), of_part.end());
   return peaks;
 }
 
@@ -280,17 +273,11 @@ void keep_highest(std::vector<Spot>& spots, const Volume& volume, Widths w) {
   spots.resize(most);
 }
 
-std::vector<Spot> spots_of(const std::vector<Peak>& peaks) {
-  std::vector<Spot> spots;
-  for (const Peak& p : peaks) spots.push_back({.place = p.place, .height = p.height});
-  return spots;
-}
-
 /// What stands out of the rest: a bead that another hid, unless it is what the other's picture has beyond a Gaussian.
 std::vector<Spot> hidden(const SpotFit& fit, double detection_snr, int threads) {
   const Volume& rest = fit.rest();
   const Widths w = fit.shape().at({0.5 * rest.width, 0.5 * rest.height, 0.5 * rest.depth});
-  std::vector<Spot> found = spots_of(peaks_of(rest, w, fit.noise(), detection_snr, threads));
+  std::vector<Spot> found = peaks_of(rest, w, fit.noise(), detection_snr, threads);
   drop_dimmest(found, least_heights(fit.spots(), rest.depth), rest.depth);
   std::vector<Vec3> places;
   const double stretch = w.xy / w.z;
@@ -315,7 +302,7 @@ Detection detect(std::vector<images::Image> slices, double detection_snr, const 
   Noise noise = flatten(volume, across, threads);
   noise.light_variance = light_variance_of(volume, noise);
   const Widths first{across, width_along_z(volume)};
-  std::vector<Spot> spots = spots_of(peaks_of(volume, first, noise, detection_snr, threads));
+  std::vector<Spot> spots = peaks_of(volume, first, noise, detection_snr, threads);
   drop_dimmest(spots, least_heights(spots, volume.depth), volume.depth);
   keep_highest(spots, volume, first);
   SpotFit fit(volume, SpotShape(first), noise, threads);

@@ -138,11 +138,8 @@ Read read_and_detect(const fs::path& file, const images::PlaneChoice& plane, con
   const Frame frame = frame_of(file.string(), slices);
   require_slices(frame);
   if (as) require_same_size(*as, frame);
-  for (const images::Image& slice : slices) {
-    if (!slice.is_lossy) continue;
-    context.notice(images::noticed_loss({file.string(), slice}));
-    break;
-  }
+  if (const auto lossy = std::ranges::find(slices, true, &images::Image::is_lossy); lossy != slices.end())
+    context.notice(images::noticed_loss({file.string(), *lossy}));
   const auto not_finite = [](const images::Image& slice) {
     return std::ranges::any_of(slice.pixels, [](float v) { return !std::isfinite(v); });
   };
