@@ -215,7 +215,12 @@ class Matcher {
   };
   struct Found {
     int partner = -1;
-    double score = 0, margin = 0;
+    double score = 0, next = 0;
+    double margin() const { return score - next; }
+    void offer(int other, double of_other) {
+      next = std::max(next, std::min(score, of_other));
+      if (of_other > score) score = of_other, partner = other;
+    }
   };
 
   double similarity(std::size_t bead, std::size_t partner, const Eigen::Matrix3d& strain, double slack) const {
@@ -237,20 +242,12 @@ class Matcher {
     for (std::size_t k = step / 2; k < n; k += step) asked.push_back(k);
     std::vector<Found> found(asked.size());
     numerics::parallel_for(static_cast<int>(asked.size()), threads_, [&](int k) {
-      Found& best = found[k];
-      for (std::size_t other = 0; other < stressed_.beads.size(); ++other) {
-        const double s = similarity(asked[k], other, turn, kSlack);
-        if (s > best.score) {
-          best.margin = s - best.score;
-          best.score = s, best.partner = static_cast<int>(other);
-        } else {
-          best.margin = std::min(best.margin, best.score - s);
-        }
-      }
+      for (std::size_t other = 0; other < stressed_.beads.size(); ++other)
+        found[k].offer(static_cast<int>(other), similarity(asked[k], other, turn, kSlack));
     });
     std::vector<Vote> votes;
     for (std::size_t k = 0; k < asked.size(); ++k) {
-      if (found[k].score > kLeast && found[k].margin > kClear)
+      if (found[k].score > kLeast && found[k].margin() > kClear)
         votes.push_back({relaxed_.beads[asked[k]].position_um, stressed_.beads[found[k].partner].position_um});
     }
     return votes;
@@ -333,12 +330,10 @@ class Matcher {
   Found look(std::size_t bead, const Expected& expected, double reach_um, double slack, double least) const {
     constexpr int kMost = 120;
     Found best;
-    double next = 0;
     const double light = relaxed_.beads[bead].brightness;
     for (const int other : stressed_.near.within(expected.place, reach_um, kMost)) {
       const PlacedBead& o = stressed_.beads[other];
-      const double s = similarity(bead, static_cast<std::size_t>(other), expected.strain, slack);
-      double score = s;
+      double score = similarity(bead, static_cast<std::size_t>(other), expected.strain, slack);
       if (is_nearby_) {
         const Vec3 d = o.position_um - expected.place;
         const double far = std::hypot(d.x, d.y, d.z * sigma_um_ / sigma_z_um_) / (2 * sigma_um_ + 0.1 * spacing_um_);
@@ -348,14 +343,8 @@ class Matcher {
         const double off = (std::log(o.brightness / light) - light_ratio_) / light_spread_;
         score -= 0.1 * std::min(2.0, off * off / 9);
       }
-      if (score > best.score) {
-        next = best.score;
-        best.partner = other, best.score = score;
-      } else {
-        next = std::max(next, score);
-      }
+      best.offer(other, score);
     }
-    best.margin = best.score - next;
     if (best.score < least) best.partner = -1;
     return best;
   }
@@ -377,7 +366,7 @@ class Matcher {
       m = {};
       if (found[bead].partner < 0) continue;
       const bool is_owner = owner[found[bead].partner] == static_cast<int>(bead);
-      if (!is_owner || found[bead].margin < kMargin) {
+      if (!is_owner || found[bead].margin() < kMargin) {
         m.flag = TrackFlag::ambiguous;
         continue;
       }
