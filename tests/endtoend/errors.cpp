@@ -235,8 +235,8 @@ TEST_F(Errors, what_was_probably_meant_is_named) {
 TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) {
   EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string()).output, " beads, "));
   EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string() + " --json").output, "\"fine\":true"));
-  EXPECT_TRUE(has_words(files::read_text(cell_ / "check.html"), "alt=\"actin\"", "beads, relaxed and stressed",
-                        "class=\"fine\""));
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "check.html"), "alt=\"actin image\"", "beads, relaxed and stressed",
+                        "class=\"good\""));
   files::write_text(cell_ / "check.html", "the user's own");
   EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string()).output, "did not make it"));
   fs::remove(cell_ / "check.html");
