@@ -13,6 +13,8 @@
 namespace mbtfm::survey {
 namespace {
 
+using namespace std::string_literals;
+
 /// What an image file says of itself, as a comment; its calibration.
 struct Says {
   std::string note;
@@ -78,8 +80,12 @@ Written cell_toml(const std::filesystem::path& folder) {
   std::optional<Says> stacks;
   for (const char* key : {"beads_stressed", "beads_relaxed", "surface_beads", "adhesion", "actin"}) {
     const auto file = roles.files.find(key);
+    if (const auto series = series_in(folder); file == roles.files.end() && key == "beads_stressed"s && series) {
+      images += line_of("series", {quoted(*series), std::to_string(images_in(folder / *series).size())});
+      continue;
+    }
     if (file == roles.files.end()) {
-      const bool is_needed = key != std::string("surface_beads") && (!stacks || std::string(key).starts_with("beads_"));
+      const bool is_needed = key != "surface_beads"s && (!stacks || std::string(key).starts_with("beads_"));
       if (!is_needed) continue;  // a cell in space may have no other images
       images += line_of("no-file", {key});
       open.push_back(std::string(key) + " in [images]");

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@ namespace mbtfm::survey {
 std::vector<std::string> images_in(const std::filesystem::path& folder);
 /// The same of the frames of a series. @throws InputError where there are none
 std::vector<std::string> frames_in(const std::filesystem::path& folder);
+
+/// The only folder in this one whose name speaks of beads or of times and that has pictures: the frames of a series.
+std::optional<std::string> series_in(const std::filesystem::path& folder);
 
 struct Roles {
   std::map<std::string, std::string> files;  ///< by key of [images]: adhesion, actin, beads_stressed, beads_relaxed

@@ -362,5 +362,14 @@ TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
   EXPECT_TRUE(has_words(output_of("mbtfm run --preset fast " + cell_.string()), "total force "));
 }
 
+TEST_F(Errors, init_takes_a_folder_of_bead_images_for_a_series) {
+  fs::remove(cell_ / "cell.toml");
+  fs::create_directory(cell_ / "Frames");
+  fs::rename(cell_ / "beads_stressed.tif", cell_ / "Frames/t1.tif");
+  fs::copy(cell_ / "Frames/t1.tif", cell_ / "Frames/t2.tif");
+  output_of("mbtfm init " + cell_.string());
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "cell.toml"), "\nbeads_stressed = \"Frames\"", "2 pictures"));
+}
+
 }  // namespace
 }  // namespace mbtfm
