@@ -119,10 +119,11 @@ RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError&
   const auto across_by = [&](const VectorXd& variance) {
     VectorXd by_adhesion(variance.size() / dimension);
     for (Index a = 0; a < by_adhesion.size(); ++a) {
-      const MatrixXd directions = numerics::across(forces_nN.segment(dimension * a, dimension));
-      const auto rows = left.middleRows(left.size() == 0 ? 0 : dimension * a, left.size() == 0 ? 0 : dimension);
-      by_adhesion[a] = left.size() == 0 ? variance[dimension * a] * static_cast<double>(directions.cols())
-                                        : (directions.transpose() * rows).cwiseAbs2().colwise().sum().dot(variance);
+      const MatrixXd aside = numerics::across(forces_nN.segment(dimension * a, dimension)).transpose();
+      by_adhesion[a] =
+          left.size() == 0
+              ? variance[dimension * a] * static_cast<double>(aside.rows())
+              : (aside * left.middleRows(dimension * a, dimension)).cwiseAbs2().colwise().sum().dot(variance);
     }
     return by_adhesion;
   };

@@ -5,6 +5,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/stage/help.h"
 #include "segment/images/image.h"
 #include "segment/stacks/track.h"
@@ -12,8 +13,6 @@
 
 namespace mbtfm::survey {
 namespace {
-
-using namespace std::string_literals;
 
 /// What an image file says of itself, as a comment; its calibration.
 struct Says {
@@ -24,6 +23,10 @@ struct Says {
 };
 
 Says says_of(const std::filesystem::path& file) {
+  if (files::is_folder(file))
+    return {.note = stage::help_on("lines of cell.toml", "series", {std::to_string(images_in(file).size())}),
+            .pixel_size_um = {},
+            .z_step_um = {}};
   try {
     const images::Image image = images::read_image(file);
     Says says{.note = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels",
@@ -71,8 +74,7 @@ std::string track_table(const Says& beads, std::vector<std::string>& open) {
 }  // namespace
 
 Written cell_toml(const std::filesystem::path& folder) {
-  const std::vector<std::string> names = images_in(folder);
-  const Roles roles = roles_of(names);
+  const Roles roles = roles_of(folder);
   std::string images;
   std::vector<std::string> open;
   std::optional<double> pixel_size_um;
@@ -80,12 +82,8 @@ Written cell_toml(const std::filesystem::path& folder) {
   std::optional<Says> stacks;
   for (const char* key : {"beads_stressed", "beads_relaxed", "surface_beads", "adhesion", "actin"}) {
     const auto file = roles.files.find(key);
-    if (const auto series = series_in(folder); file == roles.files.end() && key == "beads_stressed"s && series) {
-      images += line_of("series", {quoted(*series), std::to_string(images_in(folder / *series).size())});
-      continue;
-    }
     if (file == roles.files.end()) {
-      const bool is_needed = key != "surface_beads"s && (!stacks || std::string(key).starts_with("beads_"));
+      const bool is_needed = key != std::string("surface_beads") && (!stacks || std::string(key).starts_with("beads_"));
       if (!is_needed) continue;  // a cell in space may have no other images
       images += line_of("no-file", {key});
       open.push_back(std::string(key) + " in [images]");

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <optional>
 #include <string_view>
 
 #include "pipeline/contract/errors.h"
@@ -40,6 +40,17 @@ std::string key_of(const std::string& file) {
   return has_any(name, kStressed) ? "beads_stressed" : "";
 }
 
+/// None where there are several.
+std::optional<std::string> series_in(const std::filesystem::path& folder) {
+  std::vector<std::string> found;
+  for (const fs::path& below : files::visible_in(folder)) {
+    const std::string name = below.filename().string(), small = files::lower_case(name);
+    const bool is_named = has_any(small, kSeries) || has_any(small, kBeads) || has_any(small, kStressed);
+    if (is_named && files::is_folder(below) && images_in(below).size() > 1) found.push_back(name);
+  }
+  return found.size() == 1 ? std::optional(found.front()) : std::nullopt;
+}
+
 }  // namespace
 
 std::vector<std::string> images_in(const std::filesystem::path& folder) {
@@ -58,26 +69,17 @@ std::vector<std::string> frames_in(const std::filesystem::path& folder) {
   return names;
 }
 
-std::optional<std::string> series_in(const std::filesystem::path& folder) {
-  std::vector<std::string> found;
-  for (const fs::path& below : files::visible_in(folder)) {
-    const std::string name = below.filename().string(), small = files::lower_case(name);
-    const bool is_named = has_any(small, kSeries) || has_any(small, kBeads) || has_any(small, kStressed);
-    if (is_named && files::is_folder(below) && images_in(below).size() > 1) found.push_back(name);
-  }
-  return found.size() == 1 ? std::optional(found.front()) : std::nullopt;
-}
-
-Roles roles_of(const std::vector<std::string>& names) {
+Roles roles_of(const std::filesystem::path& folder) {
   std::map<std::string, std::vector<std::string>> by_key;
   Roles roles;
-  for (const std::string& name : names) by_key[key_of(name)].push_back(name);
+  for (const std::string& name : images_in(folder)) by_key[key_of(name)].push_back(name);
   for (const auto& [key, files] : by_key)
     if (!key.empty() && files.size() == 1)
       roles.files[key] = files.front();
     else
       roles.unknown.insert(roles.unknown.end(), files.begin(), files.end());
   std::ranges::sort(roles.unknown);
+  if (const auto series = series_in(folder)) roles.files.try_emplace("beads_stressed", *series);
   return roles;
 }
 

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,16 +14,14 @@ std::vector<std::string> images_in(const std::filesystem::path& folder);
 /// The same of the frames of a series. @throws InputError where there are none
 std::vector<std::string> frames_in(const std::filesystem::path& folder);
 
-/// The only folder in this one whose name speaks of beads or of times and that has pictures: the frames of a series.
-std::optional<std::string> series_in(const std::filesystem::path& folder);
-
 struct Roles {
   std::map<std::string, std::string> files;  ///< by key of [images]: adhesion, actin, beads_stressed, beads_relaxed
   std::vector<std::string> unknown;          ///< names that tell nothing, or that several files share
 };
 
 /// A name tells by the words that laboratories use in it ("cell3_paxillin.tif", "beads_after_trypsin.tif"). Where two
-/// files fit a key, it stays open, and both are unknown.
-Roles roles_of(const std::vector<std::string>& names);
+/// files fit a key, it stays open, and both are unknown. The only folder whose name speaks of beads or of times and
+/// that has pictures has the stressed beads' frames.
+Roles roles_of(const std::filesystem::path& folder);
 
 }  // namespace mbtfm::survey
