@@ -30,7 +30,7 @@ class GeometryAnswer {
 };
 
 /// A contractile cell in equilibrium under given tensions. Forces are those on the substrate, (fx, fy) of
-/// adhesion_ids()[i] at 2i, 2i+1.
+/// adhesion_ids()[i] at 2i, 2i+1; in space (fx, fy, fz) at 3i to 3i+2.
 class AtRest {
  public:
   virtual ~AtRest() = default;

@@ -7,6 +7,7 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/effects.h"
 #include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/model_error.h"
 #include "mbtfm/tensions/placement.h"
 #include "mbtfm/tensions/search.h"
 #include "mbtfm/tensions/second_placement.h"
@@ -181,7 +182,9 @@ DataOfBeads data_of(const GelUnderCell& on, const DisplacementField& beads, subs
   const Parameters& p = on.parameters;
   DataOfBeads result{.data = reduce(beads, std::move(response), beads_in_region(beads, on.cell, p.fit), on.threads,
                                     allows_common_motion(p.effects) ? affine_motions(beads) : MatrixXd())};
-  for (const Adhesion& a : on.cell.adhesions) result.data.load_centre_um.push_back(a.position_um);
+  std::vector<Vec2> places_um;
+  for (const Adhesion& a : on.cell.adhesions) places_um.push_back(a.position_um);
+  result.data.balance = tensions::balance_of(places_um);
   if (!allows_forces_beyond(p.effects, on.cell)) return result;
   auto [data, beyond] = with_forces_beyond(std::move(result.data), on.cell, p.gel);
   return {std::move(data), beyond};

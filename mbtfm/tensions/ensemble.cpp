@@ -16,12 +16,13 @@ namespace mbtfm::tensions {
 
 namespace {
 
-void check_suffice(Index n_components, Index n_tensions) {
-  if (n_components >= n_tensions) return;
+void check_suffice(const LinearData& data, Index n_tensions) {
+  if (data.n_used >= n_tensions) return;
+  const Index each = data.dimension;
   throw InvalidData("displacement",
-                    "at least " + std::to_string((n_tensions + 1) / 2) + " good beads in the region of the fit for " +
-                        std::to_string(n_tensions) + " tensions",
-                    std::to_string(n_components / 2));
+                    "at least " + std::to_string((n_tensions + each - 1) / each) +
+                        " good beads in the region of the fit for " + std::to_string(n_tensions) + " tensions",
+                    std::to_string(data.n_used / each));
 }
 
 /// Forces with every fibre at the network's tension.
@@ -134,7 +135,8 @@ std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh
     const double variance = from_noise + (model.size() > 0 ? model.col(i).sum() : 0);
     Estimate estimate{.value = value[i], .noise = std::sqrt(from_noise), .standard_error = std::sqrt(variance)};
     double squares = 0;  // Welch–Satterthwaite, over the adhesions
-    for (Index row = 0; row < model.rows(); row += 2) squares += std::pow(model(row, i) + model(row + 1, i), 2);
+    for (Index row = 0; row < model.rows(); row += all.data.dimension)
+      squares += std::pow(model.col(i).segment(row, all.data.dimension).sum(), 2);
     if (squares > 0) estimate.degrees = std::min(1e6, variance * variance / squares * kDegreesByAdhesion);
     estimates.push_back(estimate);
   }
@@ -171,16 +173,16 @@ VectorXd exerted_nN(const EnsembleFit& all, const VectorXd& network_nN) {
 /// Of the adhesions' forces, along the mean over meshes.
 std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
   constexpr Index kAtOnce = 256;  // adhesions: some MB of numbers
-  const Index n = all.forces.nN.size() / 2;
+  const Index each = all.data.dimension, n = all.forces.nN.size() / each;
   const VectorXd forces_nN = adhesion_forces_nN(all);
   std::vector<Estimate> magnitudes;
   for (Index first = 0; first < n; first += kAtOnce) {
     const Index count = std::min(kAtOnce, n - first);
     MatrixXd along = MatrixXd::Zero(all.forces.nN.size(), count);
     for (Index k = 0; k < count; ++k) {
-      const Eigen::Vector2d force = forces_nN.segment<2>(2 * (first + k));
-      along.col(k).segment<2>(2 * (first + k)) =
-          force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+      const VectorXd force = forces_nN.segment(each * (first + k), each);
+      along.col(k).segment(each * (first + k), each) =
+          force.norm() > 0 ? VectorXd(force.normalized()) : VectorXd::Unit(each, 0);
     }
     if (all.forces.own) {
       const auto value_of = [&](const MeshFit& mesh) -> VectorXd {
@@ -189,10 +191,11 @@ std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
       for (const Estimate& magnitude : with_own_forces(all, along, value_of, true)) magnitudes.push_back(magnitude);
       continue;
     }
-    const MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
+    const MatrixXd own = along.middleRows(each * first, each * count);  // the others are zero
     const auto of_mesh = [&](const MeshFit& mesh) {
-      return Quantities{numerics::transposed_matvec(own, mesh.fit.trial.forces_nN.segment(2 * first, 2 * count)),
-                        numerics::transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
+      return Quantities{
+          numerics::transposed_matvec(own, mesh.fit.trial.forces_nN.segment(each * first, each * count)),
+          numerics::transposed_product(mesh.force_derivatives.middleRows(each * first, each * count), own)};
     };
     for (const Estimate& magnitude : estimates_of(all, of_mesh, along, true)) magnitudes.push_back(magnitude);
   }
@@ -233,17 +236,19 @@ Sides mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
 
 /// Errors by way of the forces' directions in the mean over meshes.
 Estimate total_force_of(const EnsembleFit& all) {
-  const VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
+  const Index dimension = all.data.dimension;
+  const VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN, dimension);
   const auto value_of = [&](const MeshFit& mesh) -> VectorXd {
     const MatrixXd derivatives =
         all.forces.own ? numerics::small_product(all.forces.own->left, mesh.force_derivatives) : mesh.force_derivatives;
     return VectorXd::Constant(
         1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + numerics::matvec(derivatives, mesh.past_bounds_nN)) -
-               magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
+               magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2, dimension));
   };
   Estimate total = with_own_forces(all, along, value_of).front();
   if (all.forces.own)
-    total.value -= lengthened_nN(forces_nN, all.misfit.variance * across_nN2(forces_nN, all.forces.own->covariance));
+    total.value -=
+        lengthened_nN(forces_nN, all.misfit.variance * across_nN2(forces_nN, all.forces.own->covariance, dimension));
   if (!all.model_error) return total;
   const RoughnessOfTotal roughness = roughness_of_total(all);
   total.value += roughness.lacking_nN - roughness.surplus_nN;
@@ -253,7 +258,7 @@ Estimate total_force_of(const EnsembleFit& all) {
 
 /// Proportional to the network's tension.
 Estimate network_force_of(const EnsembleFit& all) {
-  const VectorXd along = directions_of(all.forces.of_network_nN);
+  const VectorXd along = directions_of(all.forces.of_network_nN, all.data.dimension);
   const auto per_tension = [&](const MeshFit& mesh) {
     const double tension = mesh.local.tensions_nN[0];
     return tension > 0 ? along.dot(mesh.network_forces_nN) / tension : 0;
@@ -385,11 +390,12 @@ Trial next_start(const EnsembleFit& fit) {
   return start;
 }
 
-VectorXd directions_of(const VectorXd& forces_nN) {
+VectorXd directions_of(const VectorXd& forces_nN, Index dimension) {
   VectorXd along = VectorXd::Zero(forces_nN.size());
-  for (Index row = 0; row < forces_nN.size(); row += 2) {
-    const double size = forces_nN.segment<2>(row).norm();
-    if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
+  for (Index row = 0; row < forces_nN.size(); row += dimension) {
+    const auto force = forces_nN.segment(row, dimension);
+    const double size = force.norm();
+    if (size > 0) along.segment(row, dimension) = force / size;
   }
   return along;
 }
@@ -461,10 +467,11 @@ void add_telling(EnsembleFit& all) {
   const MeshFit& mesh = all.meshes.front();
   const VectorXd leverage = studentized(all.data, mesh.fit.trial, mesh.force_derivatives).leverage;
   const VectorXd residual = weighted_residual(all.data, adhesion_forces_nN(all));
-  const Eigen::Map<const Eigen::Matrix2Xd> by_bead(residual.data(), 2, leverage.size());
+  const Index each = all.data.dimension;
+  const Eigen::Map<const MatrixXd> by_bead(residual.data(), each, leverage.size());
   const double squares = by_bead.colwise().squaredNorm().dot(leverage);
   const double sum = std::max(leverage.sum(), 1e-300);
-  all.misfit.telling_variance = squares / (2 * sum);
+  all.misfit.telling_variance = squares / (static_cast<double>(each) * sum);
   all.misfit.telling_error = leverage.norm() / sum;
   if (all.misfit.loss == Loss::squares)  // others weigh such beads down
     all.misfit.variance = std::max(all.misfit.variance, all.misfit.telling_variance);
@@ -474,7 +481,7 @@ void add_telling(EnsembleFit& all) {
 /// @param is_whole  all that the cell pulls at is among them: they balance
 Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_whole) {
   Discrepancy beside = discrepancy_of(all.data.reduced, mean_of(forces_at_mean(all)), sum_over_meshes_nN(all), error,
-                                      is_whole ? all.data.load_centre_um : std::vector<Vec2>(), all.data.threads);
+                                      is_whole ? all.data.balance : MatrixXd(), all.data.threads);
   const std::optional<OwnForces> near_cut = own_forces_in(all.data);
   all.forces.own = near_cut ? one_after_the_other(beside.forces, *near_cut) : beside.forces;
   return beside;
@@ -512,7 +519,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   const int n_meshes = static_cast<int>(networks.size());
   EnsembleFit all;
   all.tensions.fibre_ids = networks.front().fibre_ids();
-  check_suffice(data.n_used, static_cast<Index>(all.tensions.fibre_ids.size()));
+  check_suffice(data, static_cast<Index>(all.tensions.fibre_ids.size()));
   std::mutex mutex;
   int n_done = 0;
   const auto tell = [&] {

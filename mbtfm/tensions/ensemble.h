@@ -124,7 +124,7 @@ VectorXd values_of(const EnsembleFit& fit);
 
 /// Unit vectors of forces (fx, fy by adhesion), zero where a force is: the change of the sum of their magnitudes is
 /// along them.
-VectorXd directions_of(const VectorXd& forces_nN);
+VectorXd directions_of(const VectorXd& forces_nN, Index dimension = 2);
 
 /// Covariance of estimates of what the beads do besides, from their noise and the model's error, the tensions following
 /// both.

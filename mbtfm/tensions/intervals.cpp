@@ -165,16 +165,16 @@ VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, c
   return numerics::matvec(-0.5 * response, numerics::transposed_matvec(jacobian, bend.rowwise().sum()));
 }
 
-double magnitude_bias_nN(const VectorXd& forces_nN, const MatrixXd& derivatives, const MatrixXd& covariance_nN2) {
+double magnitude_bias_nN(const VectorXd& forces_nN, const MatrixXd& derivatives, const MatrixXd& covariance_nN2,
+                         Index dimension) {
   double bias = 0;
-  for (Index row = 0; row < forces_nN.size(); row += 2) {
-    const Eigen::Vector2d force = forces_nN.segment<2>(row);
+  for (Index row = 0; row < forces_nN.size(); row += dimension) {
+    const VectorXd force = forces_nN.segment(row, dimension);
     const double size = force.norm();
     if (size <= 0) continue;
-    const Eigen::Vector2d across(-force.y() / size, force.x() / size);
-    const VectorXd gradient = derivatives.middleRows<2>(row).transpose() * across;
+    const MatrixXd gradients = derivatives.middleRows(row, dimension).transpose() * numerics::across(force);
     // No more than the force itself: where the error is as large as the force the second order says nothing.
-    bias += std::min(size, numerics::quadratic_form(covariance_nN2, gradient) / (2 * size));
+    bias += std::min(size, numerics::quadratic_forms(covariance_nN2, gradients).sum() / (2 * size));
   }
   return bias;
 }

@@ -46,7 +46,8 @@ VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, c
 /// lengthens it by its square over 2 F.
 /// @param forces_nN  by adhesion: fx, fy
 /// @param derivatives  of the forces, by tension
-double magnitude_bias_nN(const VectorXd& forces_nN, const MatrixXd& derivatives, const MatrixXd& covariance_nN2);
+double magnitude_bias_nN(const VectorXd& forces_nN, const MatrixXd& derivatives, const MatrixXd& covariance_nN2,
+                         Index dimension = 2);
 
 /// Distance to either end of an interval.
 struct Sides {

@@ -95,7 +95,8 @@ ReducedData reduced_by(const LinearData& data, const VectorXd& weight, Root C) {
           .floor_squared = floor_squared,
           .n_components = data.n_used,
           .n_felt = C.n_felt,
-          .is_upper = true};
+          .is_upper = true,
+          .dimension = data.dimension};
 }
 
 /// Motions that cost a component of the beads each, as nothing is known of their sizes.
@@ -252,7 +253,8 @@ MatrixXd displace(const ReducedData& data, const MatrixXd& forces_nN, int thread
 
 VectorXd squared_weights(const LinearData& data) {
   VectorXd weight = data.weight_per_um.cwiseAbs2();
-  for (Index b = 0; b < data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= data.bead_weight[b];
+  const Index each = data.dimension;
+  for (Index b = 0; b < data.bead_weight.size(); ++b) weight.segment(each * b, each) *= data.bead_weight[b];
   return weight;
 }
 
@@ -287,9 +289,9 @@ VectorXd weighted_residual(const LinearData& data, const VectorXd& forces_nN) {
   return data.weight_per_um.cwiseProduct(residual_um(data, forces_nN));
 }
 
-double total_nN(const VectorXd& forces_nN) {
+double total_nN(const VectorXd& forces_nN, Index dimension) {
   double sum = 0;
-  for (Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
+  for (Index row = 0; row < forces_nN.size(); row += dimension) sum += forces_nN.segment(row, dimension).norm();
   return sum;
 }
 

@@ -1,4 +1,6 @@
 /// The bead displacements as the fit sees them: linear in the adhesion forces, so all beads reduce to one small matrix.
+/// Comments say 2· for the components of a force or a bead's displacement, as in the plane. In space these are 3
+/// (`dimension`), and tensions, their intervals, forces and their errors are found the same way.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,6 +26,7 @@ struct ReducedData {
   Index n_components = 0;                      ///< of the beads' displacements that it stands for
   Index n_felt = 0;                            ///< directions of the forces that any bead feels
   bool is_upper = false;                       ///< C is an upper triangle
+  Index dimension = 2;                         ///< components of a force
 };
 /// C F: 2·adhesions × any number
 MatrixXd displace(const ReducedData& data, const MatrixXd& forces_nN, int threads = 1);
@@ -46,16 +49,18 @@ Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);
 
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
+  std::vector<double> height_um = {};  ///< of the beads, in space; empty: all alike
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
-  std::vector<Vec2> load_centre_um;    ///< of the adhesions; empty: not known
-  VectorXd displacement_um;            ///< u: 2·beads, in the same order, less the offset
-  VectorXd offset_um;                  ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
-  VectorXd weight_per_um;              ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
-  VectorXd bead_weight;                ///< by bead, 0 … 1: what a robust loss leaves of W²
+  MatrixXd balance;          ///< 2·adhesions × sums that are zero where all forces balance; empty: not known
+  VectorXd displacement_um;  ///< u: 2·beads, in the same order, less the offset
+  VectorXd offset_um;        ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
+  VectorXd weight_per_um;    ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
+  VectorXd bead_weight;      ///< by bead, 0 … 1: what a robust loss leaves of W²
   Motions motions;
   Index n_used = 0;         ///< components of the beads that are used, less one for each motion of precision 0
   bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
   int threads = 1;          ///< to reduce it with
+  Index dimension = 2;      ///< components of a force, and of a bead's displacement
   ReducedData reduced;      ///< of all that, bead_weight included
 };
 
@@ -131,7 +136,7 @@ class BeadAnswers {
 };
 
 /// Sum of the magnitudes of forces (fx, fy by adhesion).
-double total_nN(const VectorXd& forces_nN);
+double total_nN(const VectorXd& forces_nN, Index dimension = 2);
 
 /// residual_um, times W: 2·beads
 VectorXd weighted_residual(const LinearData& data, const VectorXd& forces_nN);

@@ -25,12 +25,12 @@ MeshForces mean_of(const std::vector<MeshForces>& meshes) {
 namespace {
 
 /// L_a, once for each component.
-VectorXd loads_nN(const MeshForces& mean) {
+VectorXd loads_nN(const MeshForces& mean, Index dimension) {
   constexpr double kOfFibres = 0.05;
   VectorXd loads(mean.forces_nN.size());
-  for (Index row = 0; row < loads.size(); row += 2) {
-    const Eigen::Vector2d network = mean.network_part_nN.segment<2>(row);
-    loads.segment<2>(row).setConstant(network.norm() + kOfFibres * (mean.forces_nN.segment<2>(row) - network).norm());
+  for (Index row = 0; row < loads.size(); row += dimension) {
+    const auto network = mean.network_part_nN.segment(row, dimension), force = mean.forces_nN.segment(row, dimension);
+    loads.segment(row, dimension).setConstant(network.norm() + kOfFibres * (force - network).norm());
   }
   return loads;
 }
@@ -53,7 +53,7 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   const double mean_square = (data.target.squaredNorm() + data.floor_squared) / static_cast<double>(data.n_components);
   const double noise_variance = std::max(beads_variance, kLeastShare * kLeastShare * mean_square);
   const MeshForces mean = mean_of(meshes);
-  const VectorXd loads = loads_nN(mean);
+  const VectorXd loads = loads_nN(mean, data.dimension);
   const double least = least_phi_nN(meshes, mean.forces_nN, loads.sum());
 
   // E |P r|² = s² (rows − tensions) + phi tr(P C diag(L) Cᵀ P), P taking out what the tensions can follow
@@ -91,42 +91,40 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
           .stated_variance_nN2 = phi * loads,
           .cell_variance_nN2 = measured * loads,
           .noise_variance = noise_variance,
-          .is_told = is_told};
+          .is_told = is_told,
+          .dimension = data.dimension};
 }
 
 double lengthened_nN(const VectorXd& forces_nN, const VectorXd& across_nN2) {
   double sum = 0;
+  const Index dimension = forces_nN.size() / std::max<Index>(1, across_nN2.size());
   for (Index a = 0; a < across_nN2.size(); ++a) {
-    const double force = forces_nN.segment<2>(2 * a).norm();
+    const double force = forces_nN.segment(dimension * a, dimension).norm();
     sum += std::hypot(force, std::min(std::sqrt(std::max(0.0, across_nN2[a])), force)) - force;  // none turns it round
   }
   return sum;
 }
 
-namespace {
-
-/// Of length 1, across the force of adhesion a.
-Eigen::Vector2d across(const VectorXd& forces_nN, Index a) {
-  const Eigen::Vector2d force = forces_nN.segment<2>(2 * a);
-  return Eigen::Vector2d(-force.y(), force.x()) / std::max(force.norm(), 1e-300);
-}
-
-}  // namespace
-
-VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance) {
-  VectorXd variance(forces_nN.size() / 2);
+VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance, Index dimension) {
+  VectorXd variance(forces_nN.size() / dimension);
   for (Index a = 0; a < variance.size(); ++a)
-    variance[a] = numerics::quadratic_form(covariance.block<2, 2>(2 * a, 2 * a), across(forces_nN, a));
+    variance[a] = numerics::quadratic_forms(covariance.block(dimension * a, dimension * a, dimension, dimension),
+                                            numerics::across(forces_nN.segment(dimension * a, dimension)))
+                      .sum();
   return variance;
 }
 
 RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError& error, const MatrixXd& left) {
+  const Index dimension = error.dimension;
   const auto across_by = [&](const VectorXd& variance) {
-    VectorXd by_adhesion(variance.size() / 2);
-    for (Index a = 0; a < by_adhesion.size(); ++a)
-      by_adhesion[a] = left.size() == 0
-                           ? variance[2 * a]
-                           : (left.middleRows<2>(2 * a).transpose() * across(forces_nN, a)).cwiseAbs2().dot(variance);
+    VectorXd by_adhesion(variance.size() / dimension);
+    for (Index a = 0; a < by_adhesion.size(); ++a) {
+      const MatrixXd aside = numerics::across(forces_nN.segment(dimension * a, dimension)).transpose();
+      by_adhesion[a] =
+          left.size() == 0
+              ? variance[dimension * a] * static_cast<double>(aside.rows())
+              : (aside * left.middleRows(dimension * a, dimension)).cwiseAbs2().colwise().sum().dot(variance);
+    }
     return by_adhesion;
   };
   const VectorXd across_mean = across_by(error.phi_of_mean_nN * error.loads_nN);
@@ -140,7 +138,7 @@ RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError&
   // edges, or to the rims of adhesions, make 1.0 % beyond what two networks of a kind differ by (`other_network
   // totals`).
   constexpr double kOfEdge = 0.011, kOfLinks = 0.010;
-  const double total = total_nN(forces_nN);
+  const double total = total_nN(forces_nN, dimension);
   return {.lacking_nN = of_cell - of_mean,
           .surplus_nN = kOfEdge / 2 * total,
           .sigma_nN = std::hypot(of_loads, kOfEdge / std::sqrt(12.0) * total, kOfLinks * total)};
@@ -164,17 +162,6 @@ ReducedData whitened(const ReducedData& data, const VectorXd& force_variance, in
 namespace {
 
 constexpr double kDegrees = 4;  // ν
-
-/// By force: the sums that are zero if all forces together balance; 2·adhesions × 3, or × 0.
-MatrixXd sums_in_balance(const std::vector<Vec2>& centres_um) {
-  MatrixXd sums(2 * std::ssize(centres_um), centres_um.empty() ? 0 : 3);
-  const Vec2 middle = centre_of(centres_um);
-  for (std::size_t a = 0; a < centres_um.size(); ++a) {
-    const Vec2 arm = centres_um[a] - middle;
-    sums.middleRows<2>(2 * static_cast<Index>(a)) << 1, 0, -arm.y, 0, 1, arm.x;
-  }
-  return sums;
-}
 
 /// What the tensions that are free cannot follow.
 struct Beyond {
@@ -217,10 +204,8 @@ class Posterior {
   MatrixXd root_, sums_, answers_, gain_;
 };
 
-VectorXd by_component(const VectorXd& by_adhesion) {
-  VectorXd twice(2 * by_adhesion.size());
-  for (Index a = 0; a < by_adhesion.size(); ++a) twice.segment<2>(2 * a).setConstant(by_adhesion[a]);
-  return twice;
+VectorXd by_component(const VectorXd& by_adhesion, Index dimension) {
+  return by_adhesion.transpose().replicate(dimension, 1).reshaped();
 }
 
 /// An adhesion that nothing pulls at by this model may still bear something.
@@ -228,8 +213,18 @@ VectorXd not_without(const VectorXd& loads_nN) { return loads_nN.cwiseMax(1e-3 *
 
 }  // namespace
 
+MatrixXd balance_of(const std::vector<Vec2>& places_um) {
+  MatrixXd sums(2 * std::ssize(places_um), 3);
+  const Vec2 middle = centre_of(places_um);
+  for (std::size_t a = 0; a < places_um.size(); ++a) {
+    const Vec2 arm = places_um[a] - middle;
+    sums.middleRows<2>(2 * static_cast<Index>(a)) << 1, 0, -arm.y, 0, 1, arm.x;
+  }
+  return sums;
+}
+
 Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, const VectorXd& tensions_nN,
-                           const ModelError& error, const std::vector<Vec2>& centres_um, int threads) {
+                           const ModelError& error, const MatrixXd& balance, int threads) {
   const double variance = error.noise_variance;
   const MatrixXd C = displace(data, MatrixXd::Identity(data.compliance->cols(), data.compliance->cols()), threads);
   const MatrixXd J = of_free_tensions(mean.derivatives, tensions_nN), A = displace(data, J),
@@ -239,10 +234,8 @@ Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, cons
   beyond.H = numerics::gram(beyond.compliance, threads) / variance;
   beyond.q =
       numerics::transposed_matvec(beyond.compliance, numerics::minus_matvec(data.target, C, mean.forces_nN)) / variance;
-  const MatrixXd sums = sums_in_balance(centres_um);
   const VectorXd loads = not_without(error.loads_nN);
-  const Index n = loads.size() / 2;
-  const VectorXd load = Eigen::Map<const VectorXd, 0, Eigen::InnerStride<2>>(loads.data(), n);
+  const Index dimension = data.dimension, n = loads.size() / dimension;
 
   // The scale converges slowly where one adhesion deviates far more than the others; forces do not change by then.
   const int n_rounds = C.cols() <= 1000 ? 10 : 4;
@@ -250,13 +243,15 @@ Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, cons
       .share_nN = {}, .scale_nN = std::max(error.measured_phi_nN, 0.05 * error.least_phi_nN), .forces = {}};
   found.share_nN = VectorXd::Constant(n, found.scale_nN);
   const auto posterior = [&] {
-    return Posterior(beyond, by_component(found.share_nN).cwiseProduct(loads), sums, threads);
+    return Posterior(beyond, by_component(found.share_nN, dimension).cwiseProduct(loads), balance, threads);
   };
   for (int round = 0; round < n_rounds; ++round) {
     const Posterior of_e = posterior();
     const VectorXd squares = of_e.times(beyond.q).col(0).cwiseAbs2() + of_e.diagonal();
-    for (Index a = 0; a < n; ++a)
-      found.share_nN[a] = (kDegrees * found.scale_nN + squares.segment<2>(2 * a).sum() / load[a]) / (kDegrees + 2);
+    for (Index a = 0; a < n; ++a) {
+      const double of_one = squares.segment(dimension * a, dimension).sum() / loads[dimension * a];
+      found.share_nN[a] = (kDegrees * found.scale_nN + of_one) / (kDegrees + static_cast<double>(dimension));
+    }
     found.scale_nN = static_cast<double>(n) / found.share_nN.cwiseInverse().sum();
   }
   // e, and what the tensions add as they follow what e leaves: A⁺ (r − C e)
@@ -273,7 +268,7 @@ Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, cons
 }
 
 ModelError with_discrepancy(ModelError error, const Discrepancy& found) {
-  error.cell_variance_nN2 = by_component(found.share_nN).cwiseProduct(error.loads_nN);
+  error.cell_variance_nN2 = by_component(found.share_nN, error.dimension).cwiseProduct(error.loads_nN);
   error.stated_variance_nN2 = error.force_variance_nN2.cwiseMax(error.cell_variance_nN2);
   return error;
 }

@@ -34,6 +34,7 @@ struct ModelError {
   VectorXd cell_variance_nN2;  ///< of the cell's own network about the mean, as the beads show it
   double noise_variance = 0;   ///< s²: 1 where the beads' errors are as stated
   bool is_told = false;        ///< there are adhesions enough for the misfit to tell phi
+  Index dimension = 2;         ///< components of a force
 };
 
 /// Of the variance of an adhesion's error: from cell to cell its logarithm scatters about the law's by 1.0 to 1.3, as
@@ -61,7 +62,7 @@ RoughnessOfTotal roughness_of_total(const VectorXd& forces_nN, const ModelError&
 /// By how much errors across them of this variance (by adhesion) lengthen forces: the sum over all.
 double lengthened_nN(const VectorXd& forces_nN, const VectorXd& across_nN2);
 /// By adhesion the variance across its force. @param covariance  of the forces
-VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance);
+VectorXd across_nN2(const VectorXd& forces_nN, const MatrixXd& covariance, Index dimension);
 
 /// phi by moments: what the meshes' mean leaves of the data, the tensions following, is s² and C Var(e) Cᵀ together.
 /// @param meshes  at least two
@@ -84,6 +85,9 @@ ReducedData whitened(const ReducedData& data, const VectorXd& force_variance, in
 // tensions being free to follow (Dempster, Laird & Rubin, J. R. Stat. Soc. B 39 (1977) 1). Where the network is right
 // τ² goes to 0 and its own forces come back.
 
+/// Sums and moments (about their middle) of forces (fx, fy) at these places: 2·places × 3.
+MatrixXd balance_of(const std::vector<Vec2>& places_um);
+
 struct Discrepancy {
   VectorXd share_nN;    ///< g_a, by adhesion
   double scale_nN = 0;  ///< τ²
@@ -92,9 +96,9 @@ struct Discrepancy {
 
 /// @param mean  of the meshes, at tensions common to all
 /// @param tensions_nN  those above zero may follow, the others are held there
-/// @param centres_um  of the adhesions; empty: their forces need not balance
+/// @param balance  as of the data; empty: the forces need not balance
 Discrepancy discrepancy_of(const ReducedData& data, const MeshForces& mean, const VectorXd& tensions_nN,
-                           const ModelError& error, const std::vector<Vec2>& centres_um, int threads);
+                           const ModelError& error, const MatrixXd& balance, int threads);
 
 /// With the variances of single adhesions that the beads show.
 ModelError with_discrepancy(ModelError error, const Discrepancy& found);

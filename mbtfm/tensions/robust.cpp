@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/distributions.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
@@ -15,8 +16,9 @@ namespace {
 /// Length of each bead's residual, of the beads in use.
 std::vector<double> used_lengths(const LinearData& data, const VectorXd& residual) {
   std::vector<double> lengths;
-  for (Index i = 0; i < residual.size(); i += 2) {
-    if (data.weight_per_um[i] > 0) lengths.push_back(residual.segment<2>(i).norm());
+  const Index each = data.dimension;
+  for (Index i = 0; i < residual.size(); i += each) {
+    if (data.weight_per_um[i] > 0) lengths.push_back(residual.segment(i, each).norm());
   }
   return lengths;
 }
@@ -52,16 +54,17 @@ NormalEquations normal_equations(const BeadJacobian& J, const VectorXd& bead_wei
                                  int threads) {
   constexpr int kPieces = 8;      // that sums are made of, whatever the threads
   constexpr Index kBeads = 4096;  // at a time in double precision
+  const Index each = J.rows() / bead_weights.size();
   std::vector<NormalEquations> sums(kPieces, {MatrixXd::Zero(J.cols(), J.cols()), VectorXd::Zero(J.cols())});
   numerics::parallel_for(kPieces, threads, [&](int piece) {
     NormalEquations& sum = sums[piece];
     for (Index first = piece * kBeads; first < bead_weights.size(); first += kPieces * kBeads) {
       const Index count = std::min(kBeads, bead_weights.size() - first);
-      VectorXd root(2 * count);
-      for (Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
-      const MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
+      VectorXd root(each * count);
+      for (Index b = 0; b < count; ++b) root.segment(each * b, each).setConstant(std::sqrt(bead_weights[first + b]));
+      const MatrixXd weighted = root.asDiagonal() * J.middleRows(each * first, each * count).cast<double>();
       numerics::add_upper_gram(weighted, sum.H, 1);
-      sum.b += numerics::transposed_matvec(weighted, root.cwiseProduct(residual.segment(2 * first, 2 * count)));
+      sum.b += numerics::transposed_matvec(weighted, root.cwiseProduct(residual.segment(each * first, each * count)));
     }
   });
   for (int piece = 1; piece < kPieces; ++piece) {
@@ -86,9 +89,9 @@ VectorXd times(const BeadJacobian& J, const VectorXd& s, int threads) {
 
 /// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
 VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian& J, const VectorXd& low, double scale,
-                        int threads) {
+                        Index each, int threads) {
   VectorXd step = VectorXd::Zero(J.cols());
-  VectorXd weights = inverse::weights_of(loss, residual, scale, 2);
+  VectorXd weights = inverse::weights_of(loss, residual, scale, each);
   constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
   for (int i = 0; i < kMaxSteps; ++i) {
     auto [H, b] = normal_equations(J, weights, residual, threads);
@@ -96,7 +99,7 @@ VectorXd linear_weights(Loss loss, const VectorXd& residual, const BeadJacobian&
     const VectorXd next = bounded_quadratic_minimum(H, -b, low);
     const double change = (next - step).norm();
     step = next;
-    weights = inverse::weights_of(loss, residual - times(J, step, threads), scale, 2);
+    weights = inverse::weights_of(loss, residual - times(J, step, threads), scale, each);
     if (change <= 1e-4 * step.norm()) break;
   }
   return weights;
@@ -115,7 +118,8 @@ WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, c
     if (is_exact(data, scale)) break;
     const TensionProblem problem(network, data.reduced, adhesion_ids, {}, threads);
     const MatrixXd derivatives = problem.force_derivatives(fit.trial);
-    const VectorXd weights = linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads);
+    const VectorXd weights =
+        linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, data.dimension, threads);
     data = reweighted(std::move(data), weights);
     const TensionProblem weighed(network, data.reduced, adhesion_ids, {}, threads);
     const auto fit_again = [&](const Trial& start, Search search) {
@@ -147,16 +151,20 @@ MatrixXd root_of(const MatrixXd& covariance) {
 
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
 bool stands_alone(const LinearData& data, const VectorXd& residual, Index row) {
-  const Vec2 place = data.position_um[row / 2];
+  const Index each = data.dimension;
+  const auto height_um = [&](Index bead) { return data.height_um.empty() ? 0 : data.height_um[bead]; };
+  const auto own = residual.segment(row, each);
   double nearest = std::numeric_limits<double>::infinity(), along = 0;
-  for (Index other = 0; other < residual.size(); other += 2) {
+  for (Index other = 0; other < residual.size(); other += each) {
     if (other == row || data.weight_per_um[other] == 0) continue;
-    const double distance = norm(data.position_um[other / 2] - place);
+    const Index a = other / each, b = row / each;
+    const Vec2 aside = data.position_um[a] - data.position_um[b];
+    const double distance = norm(Vec3{aside.x, aside.y, height_um(a) - height_um(b)});
     if (distance >= nearest) continue;
     nearest = distance;
-    along = residual.segment<2>(other).dot(residual.segment<2>(row));
+    along = residual.segment(other, each).dot(own);
   }
-  return along < 0.5 * residual.segment<2>(row).squaredNorm();
+  return along < 0.5 * own.squaredNorm();
 }
 
 }  // namespace
@@ -171,11 +179,12 @@ MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const VectorXd& ten
 Studentized studentized(const LinearData& data, const Trial& trial, const MatrixXd& force_derivatives) {
   const MatrixXd of_free = of_free_tensions(force_derivatives, trial.tensions_nN);
   const VectorXd weight = squared_weights(data).cwiseSqrt();
-  Eigen::Matrix3Xd hat = Eigen::Matrix3Xd::Zero(3, weight.size() / 2);  // its blocks: xx, xy, yy
-  const auto add = [&](const MatrixXd& independent) {                   // columns Z of a part Z Zᵀ
-    for (Index b = 0; b < hat.cols(); ++b) {
-      const auto x = independent.row(2 * b), y = independent.row(2 * b + 1);
-      hat.col(b) += Eigen::Vector3d(x.squaredNorm(), x.dot(y), y.squaredNorm());
+  const Index each = data.dimension;
+  std::vector<MatrixXd> hat(data.bead_weight.size(), MatrixXd::Zero(each, each));  // its blocks
+  const auto add = [&](const MatrixXd& independent) {                              // columns Z of a part Z Zᵀ
+    for (std::size_t b = 0; b < hat.size(); ++b) {
+      const auto own = independent.middleRows(each * static_cast<Index>(b), each);
+      hat[b].noalias() += own.lazyProduct(own.transpose());
     }
   };
   if (data.motions.shapes.cols() > 0)
@@ -187,14 +196,14 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Matrix
     const Index count = std::min(kColumns, unit.cols() - first);
     add(weight.asDiagonal() * less_motion(data, data.response->displace(unit.middleCols(first, count))));
   }
-  VectorXd residual = weighted_residual(data, trial.forces_nN);
-  for (Index b = 0; b < hat.cols(); ++b) {
-    Eigen::Matrix2d left;
-    left << 1 - hat(0, b), -hat(1, b), -hat(1, b), 1 - hat(2, b);
+  VectorXd residual = weighted_residual(data, trial.forces_nN), leverage(data.bead_weight.size());
+  for (Index b = 0; b < leverage.size(); ++b) {
     constexpr double kLeast = 0.01;  // a bead that tells all by itself leaves rounding, not a residual
-    residual.segment<2>(2 * b) = numerics::inverse_root(left, kLeast) * residual.segment<2>(2 * b);
+    auto own = residual.segment(each * b, each);
+    own = numerics::inverse_root(MatrixXd::Identity(each, each) - hat[b], kLeast) * own;
+    leverage[b] = hat[b].trace();
   }
-  return {.residual = std::move(residual), .leverage = (hat.row(0) + hat.row(2)).transpose()};
+  return {.residual = std::move(residual), .leverage = std::move(leverage)};
 }
 
 std::vector<Index> stray_beads(const LinearData& data, const Studentized& beads) {
@@ -202,25 +211,28 @@ std::vector<Index> stray_beads(const LinearData& data, const Studentized& beads)
   const double scale = robust_scale(data, residual);
   if (is_exact(data, scale)) return {};
   constexpr double kChance = 0.05;
-  const double n_beads = 0.5 * static_cast<double>(data.n_used), all = beads.leverage.sum();
+  const Index each = data.dimension;
+  const double n_beads = static_cast<double>(data.n_used) / static_cast<double>(each), all = beads.leverage.sum();
   std::vector<Index> strays;
   std::size_t n_large = 0;
   for (Index b = 0; b < beads.leverage.size(); ++b) {
-    if (data.weight_per_um[2 * b] == 0) continue;
+    if (data.weight_per_um[each * b] == 0) continue;
     const double share = 0.5 / n_beads + 0.5 * (all > 0 ? beads.leverage[b] / all : 1 / n_beads);
-    if (residual.segment<2>(2 * b).norm() <= scale * std::sqrt(-2 * std::log(kChance * share))) continue;
+    const double squares = residual.segment(each * b, each).squaredNorm() / (scale * scale);
+    if (numerics::chi_squared_above(static_cast<double>(each), squares) >= kChance * share) continue;
     ++n_large;
-    if (stands_alone(data, residual, 2 * b)) strays.push_back(b);
+    if (stands_alone(data, residual, each * b)) strays.push_back(b);
   }
   return 2 * strays.size() > n_large ? strays : std::vector<Index>();
 }
 
 double harm_done_by(const std::vector<Index>& strays, const LinearData& data, const VectorXd& weighted_residual,
                     const MatrixXd& force_derivatives) {
-  VectorXd residual(2 * strays.size()), weight(2 * strays.size());
-  for (std::size_t k = 0; k < strays.size(); ++k) {
-    residual.segment<2>(2 * static_cast<Index>(k)) = weighted_residual.segment<2>(2 * strays[k]);
-    weight.segment<2>(2 * static_cast<Index>(k)) = data.weight_per_um.segment<2>(2 * strays[k]);
+  const Index each = data.dimension, n_strays = std::ssize(strays);
+  VectorXd residual(each * n_strays), weight(each * n_strays);
+  for (Index k = 0; k < n_strays; ++k) {
+    residual.segment(each * k, each) = weighted_residual.segment(each * strays[k], each);
+    weight.segment(each * k, each) = data.weight_per_um.segment(each * strays[k], each);
   }
   const MatrixXd of_strays = weight.asDiagonal() * data.response->at_points(strays)->displace(force_derivatives);
   const MatrixXd all = numerics::gram(displace(data.reduced, force_derivatives, data.threads));
@@ -237,7 +249,7 @@ double harm_done_by(const std::vector<Index>& strays, const LinearData& data, co
 }
 
 double robust_scale(const LinearData& data, const VectorXd& weighted_residual) {
-  return inverse::scale_of(used_lengths(data, weighted_residual), 2);
+  return inverse::scale_of(used_lengths(data, weighted_residual), data.dimension);
 }
 
 WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, const std::vector<int>& adhesion_ids,
@@ -257,8 +269,9 @@ double misfit_variance(const LinearData& data, const VectorXd& forces_nN, Index 
   const auto degrees = static_cast<double>(std::max<Index>(1, data.n_used - n_tensions));
   double variance = residual.squaredNorm() / degrees;
   const std::vector<double> lengths = used_lengths(data, residual);
-  const double scale = inverse::scale_of(lengths, 2);
-  if (loss != Loss::squares && scale > 0) variance = inverse::estimator_of(loss, lengths, scale, 2).variance;
+  const Index each = data.dimension;
+  const double scale = inverse::scale_of(lengths, each);
+  if (loss != Loss::squares && scale > 0) variance = inverse::estimator_of(loss, lengths, scale, each).variance;
   return data.has_errors ? std::max(1.0, variance) : variance;
 }
 

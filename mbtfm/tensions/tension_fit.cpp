@@ -164,7 +164,7 @@ TensionProblem::TensionProblem(const network::Contractile& cell, const ReducedDa
       adhesion_ids_(adhesion_ids),
       solved_misfit_(std::move(solved_misfit)),
       threads_(threads) {
-  MBTFM_ASSERT(data.compliance->cols() == 2 * static_cast<Index>(adhesion_ids.size()));
+  MBTFM_ASSERT(data.compliance->cols() == data.dimension * static_cast<Index>(adhesion_ids.size()));
   for (const int id : cell.adhesion_ids()) {
     const auto at = std::find(adhesion_ids.begin(), adhesion_ids.end(), id);
     if (at == adhesion_ids.end()) {
@@ -178,7 +178,8 @@ TensionProblem::TensionProblem(const network::Contractile& cell, const ReducedDa
 MatrixXd TensionProblem::to_data_rows(const MatrixXd& by_adhesion_of_cell) const {
   MatrixXd rows = MatrixXd::Zero(data_.compliance->cols(), by_adhesion_of_cell.cols());
   for (std::size_t i = 0; i < pair_of_.size(); ++i) {
-    rows.middleRows<2>(2 * pair_of_[i]) = by_adhesion_of_cell.middleRows<2>(2 * static_cast<Index>(i));
+    const Index each = data_.dimension;
+    rows.middleRows(each * pair_of_[i], each) = by_adhesion_of_cell.middleRows(each * static_cast<Index>(i), each);
   }
   return rows;
 }
@@ -201,7 +202,7 @@ VectorXd TensionProblem::network_part_nN(const Trial& trial) const {
 
 VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
   const VectorXd torques = trial.rest->torques_nN_um();
-  VectorXd rows = VectorXd::Zero(data_.compliance->cols() / 2);
+  VectorXd rows = VectorXd::Zero(static_cast<Index>(adhesion_ids_.size()));
   for (std::size_t i = 0; i < pair_of_.size(); ++i) rows[pair_of_[i]] = torques[static_cast<Index>(i)];
   return rows;
 }

@@ -220,10 +220,14 @@ MatrixXd SmallCholesky::upper() const { return llt_->matrixU(); }
 
 MatrixXd inverse(const MatrixView& A) { return A.inverse(); }
 
-Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& A, double least) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(A);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(least).cwiseSqrt().cwiseInverse().asDiagonal() *
-         eigen.eigenvectors().transpose();
+MatrixXd inverse_root(const MatrixView& A, double least) {
+  const auto [values, vectors] = symmetric_eigen(A);
+  return vectors * values.cwiseMax(least).cwiseSqrt().cwiseInverse().asDiagonal() * vectors.transpose();
+}
+
+MatrixXd across(const VectorView& vector) {
+  const MatrixXd basis = vector.householderQr().householderQ();
+  return basis.rightCols(vector.size() - 1);
 }
 
 MatrixXd solve_symmetric(const MatrixXd& A, const MatrixXd& B) { return A.ldlt().solve(B); }

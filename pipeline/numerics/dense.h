@@ -113,7 +113,9 @@ class SmallCholesky {
 /// A⁻¹ of any regular A.
 MatrixXd inverse(const MatrixView& A);
 /// A^(−1/2) of a symmetric A, no eigenvalue counting as less than this one.
-Eigen::Matrix2d inverse_root(const Eigen::Matrix2d& A, double least);
+MatrixXd inverse_root(const MatrixView& A, double least);
+/// Unit vectors at right angles to this one and to each other, by column: n × (n − 1).
+MatrixXd across(const VectorView& vector);
 
 /// X of A X = B with a symmetric A, semidefinite up to rounding, by LDLᵀ with pivots.
 MatrixXd solve_symmetric(const MatrixXd& A, const MatrixXd& B);

@@ -312,15 +312,6 @@ std::vector<double> distances_um(double area_um2, double farthest_um, int n) {
 
 }  // namespace
 
-SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um) {
-  const PairFields f = fields_of<2>(gel, area_um2, distance_um, {});
-  Eigen::RowVectorXd sums = Eigen::RowVectorXd::Zero(f.products.cols());
-  for (std::size_t i = 0; i < f.patches.size(); ++i)
-    sums += f.patches[i].measure * f.products.row(static_cast<Eigen::Index>(i));
-  const auto [along, across] = excess_of<2>(sums, Eigen::RowVectorXd::Zero(2 * kPlaces));
-  return {.along_um4 = std::max(0.0, least_excess(along, 1)), .across_um4 = std::max(0.0, least_excess(across, 1))};
-}
-
 PairResolution::PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um2, int threads)
     : distance_um_(distances_um(area_um2, kFarthest_um, 2 * PairDraws{}.n_distances)),
       excess_(

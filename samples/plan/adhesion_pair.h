@@ -15,24 +15,13 @@ namespace mbtfm::plan {
 /// by more: chi² larger by kTold, odds of 90 to 1, in kChance of all experiments.
 inline constexpr double kTold = 9, kChance = 0.8;
 
-/// The squares that the best single adhesion leaves of the two's exact displacement, where beads are everywhere:
-///
-///   lambda = min over place x and force F₁ of  integral of |u₂ − G(x) F₁|² dA      (um⁴)
-///
-/// for two forces of 1 nN on a gel of 1 kPa. Half-space: the base is much further than adhesions are from each other.
-struct SquaresLeft {
-  double along_um4 = 0, across_um4 = 0;  ///< forces along the line, across it
-};
-/// @param distance_um  two radii or more: nearer ones are one
-SquaresLeft squares_left(const Gel& gel, double area_um2, double distance_um);
-
 /// chi² of one adhesion's fit less that of the fit of two, in one experiment, over the places of the one: a² times the
 /// first column + 2a times the second + the third, where the forces are a times noise and modulus. With beads at places
 /// b and their noise n
 ///
 ///   first = sum over b |u₂(b) − G F₁|²,  second = n · (u₂ − G F₁),  third = |P₂ n|² − |P₁ n|²
 ///
-/// for the best F₁ without noise; P project on what two forces and one can explain. @see SquaresLeft
+/// for the best F₁ without noise; P project on what two forces and one can explain.
 using Excess = Eigen::ArrayX3d;
 
 /// Beads below the surface.

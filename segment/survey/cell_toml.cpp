@@ -5,6 +5,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/stage/help.h"
 #include "segment/images/image.h"
 #include "segment/stacks/track.h"
@@ -22,6 +23,10 @@ struct Says {
 };
 
 Says says_of(const std::filesystem::path& file) {
+  if (files::is_folder(file))
+    return {.note = stage::help_on("lines of cell.toml", "series", {std::to_string(images_in(file).size())}),
+            .pixel_size_um = {},
+            .z_step_um = {}};
   try {
     const images::Image image = images::read_image(file);
     Says says{.note = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels",
@@ -69,8 +74,7 @@ std::string track_table(const Says& beads, std::vector<std::string>& open) {
 }  // namespace
 
 Written cell_toml(const std::filesystem::path& folder) {
-  const std::vector<std::string> names = images_in(folder);
-  const Roles roles = roles_of(names);
+  const Roles roles = roles_of(folder);
   std::string images;
   std::vector<std::string> open;
   std::optional<double> pixel_size_um;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/charts/chart.h"
 #include "pipeline/files/base64.h"
 #include "pipeline/numerics/order_statistics.h"
+#include "pipeline/report/page.h"
 
 namespace mbtfm::survey {
 namespace {
@@ -37,27 +37,31 @@ images::Picture grey(const images::Image& image) {
   return picture;
 }
 
-std::string html_of(const Thumbnail& thumbnail, const std::string& kind) {
-  return "<img class=\"" + kind + "\" alt=\"" + thumbnail.what + "\" src=\"data:image/png;base64," +
+std::string image(const Thumbnail& thumbnail) {
+  return "<img alt=\"" + thumbnail.what + " image\" src=\"data:image/png;base64," +
          files::base64(images::png_of(thumbnail.picture)) + "\">";
 }
 
-bool is_of_beads(const Thumbnail& thumbnail) { return thumbnail.what.starts_with("beads"); }
+std::string figure(const std::string& images, const std::string& caption) {
+  return "<figure><div class=\"pair\">" + images + "</div><figcaption>" + caption + "</figcaption></figure>";
+}
+
+std::string pictures(const PageRow& row) {
+  std::string html = "<div class=\"cells\" style=\"grid-template-columns:repeat(auto-fill,210px)\">", beads;
+  for (const Thumbnail& t : row.thumbnails) {
+    if (t.what.starts_with("beads"))
+      beads += image(t);
+    else
+      html += figure(image(t), t.what);
+  }
+  return html + (beads.empty() ? "" : figure(beads, "beads, relaxed and stressed")) + "</div>\n";
+}
 
 std::string html_of(const PageRow& row) {
-  std::string html = "<tr><td><b>" + charts::html_escaped(row.cell) + "</b><br>" + charts::html_escaped(row.facts);
-  for (const std::string& doubt : row.doubts) html += "<p class=\"doubt\">" + charts::html_escaped(doubt) + "</p>";
-  if (row.doubts.empty()) html += "<p class=\"fine\">fine</p>";
-  html += "</td>";
-  std::string beads;
-  for (const Thumbnail& t : row.thumbnails) {
-    if (is_of_beads(t))
-      beads += html_of(t, beads.empty() ? "beads" : "beads second");
-    else
-      html += "<td>" + html_of(t, "still") + t.what + "</td>";
-  }
-  if (!beads.empty()) html += "<td><div class=\"pair\">" + beads + "</div>beads, relaxed and stressed</td>";
-  return html + "</tr>\n";
+  std::string html = "<p>" + report::printed(row.facts) + "</p>\n<ul class=\"findings\">";
+  for (const std::string& doubt : row.doubts) html += "<li class=\"caution\">" + report::printed(doubt) + "</li>";
+  if (row.doubts.empty()) html += "<li class=\"good\">fine</li>";
+  return report::section(row.cell, html + "</ul>\n" + pictures(row));
 }
 
 }  // namespace
@@ -72,18 +76,12 @@ std::vector<Thumbnail> thumbnails_of(const CellImages& images) {
 }
 
 std::string page_of(const std::string& title, const std::vector<PageRow>& rows) {
-  std::string html =
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + charts::html_escaped(title) +
-      "</title>\n<style>body{font:15px sans-serif;margin:1.5em}td{vertical-align:top;padding:.4em 1em .8em 0;"
-      "border-top:1px solid #ccc;color:#555;font-size:13px}td:first-child{width:24em;color:#222;font-size:15px}"
-      "img{width:200px;display:block}.pair{position:relative;min-height:1px}.second{position:absolute;top:0;left:0;"
-      "animation:blink 1.2s steps(1) infinite}@keyframes blink{0%{opacity:0}50%{opacity:1}}"
-      ".doubt{color:#9a4500;margin:.4em 0}.fine{color:#1a6e2e;margin:.4em 0}</style></head>\n<body><h1>" +
-      charts::html_escaped(title) +
-      "</h1>\n<p>Does each column show what it says? The bead images take turns: beads near the cell must move, those "
-      "far from it stay or all move alike.</p>\n<table>\n";
-  for (const PageRow& row : rows) html += html_of(row);
-  return html + "</table></body></html>\n";
+  report::Page page{.title = title,
+                    .what =
+                        "Does each picture show what it says? The bead images take turns: beads near the cell must "
+                        "move, those far from it stay or all move alike."};
+  for (const PageRow& row : rows) page.body += html_of(row);
+  return report::html_of(page);
 }
 
 }  // namespace mbtfm::survey

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <optional>
 #include <string_view>
 
 #include "pipeline/contract/errors.h"
@@ -16,6 +16,7 @@ constexpr std::array kBeads = {"bead", "fluosphere", "tfm", "gel"};
 constexpr std::array kRelaxed = {"relax", "ref",    "after",   "null", "tryps",   "sds",
                                  "post",  "nocell", "no_cell", "zero", "undeform"};
 constexpr std::array kStressed = {"stress", "before", "pre", "load", "deform", "withcell", "with_cell", "force"};
+constexpr std::array kSeries = {"frame", "series", "movie", "time"};
 constexpr std::array kSurface = {"surf"};
 constexpr std::array kAdhesion = {"pax", "vinc", "zyx", "adhes", "fak", "talin", "integrin", "_fa", "fa_"};
 constexpr std::array kActin = {"actin", "phall", "_act", "act_", "fiber", "fibre", "utroph", "ftract"};
@@ -26,8 +27,8 @@ bool has_any(std::string_view name, const Words& words) {
 }
 
 /// Empty where the name tells nothing.
-std::string key_of(std::string name) {
-  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+std::string key_of(const std::string& file) {
+  const std::string name = files::lower_case(file);
   const bool is_adhesion = has_any(name, kAdhesion), is_actin = has_any(name, kActin);
   if (!has_any(name, kBeads)) {
     if (is_adhesion && is_actin) return "";
@@ -37,6 +38,17 @@ std::string key_of(std::string name) {
   if (has_any(name, kBeads) && has_any(name, kSurface)) return "surface_beads";
   if (has_any(name, kRelaxed)) return "beads_relaxed";  // "undeformed", too, which has "deform" in it
   return has_any(name, kStressed) ? "beads_stressed" : "";
+}
+
+/// None where there are several.
+std::optional<std::string> series_in(const std::filesystem::path& folder) {
+  std::vector<std::string> found;
+  for (const fs::path& below : files::visible_in(folder)) {
+    const std::string name = below.filename().string(), small = files::lower_case(name);
+    const bool is_named = has_any(small, kSeries) || has_any(small, kBeads) || has_any(small, kStressed);
+    if (is_named && files::is_folder(below) && images_in(below).size() > 1) found.push_back(name);
+  }
+  return found.size() == 1 ? std::optional(found.front()) : std::nullopt;
 }
 
 }  // namespace
@@ -57,16 +69,17 @@ std::vector<std::string> frames_in(const std::filesystem::path& folder) {
   return names;
 }
 
-Roles roles_of(const std::vector<std::string>& names) {
+Roles roles_of(const std::filesystem::path& folder) {
   std::map<std::string, std::vector<std::string>> by_key;
   Roles roles;
-  for (const std::string& name : names) by_key[key_of(name)].push_back(name);
+  for (const std::string& name : images_in(folder)) by_key[key_of(name)].push_back(name);
   for (const auto& [key, files] : by_key)
     if (!key.empty() && files.size() == 1)
       roles.files[key] = files.front();
     else
       roles.unknown.insert(roles.unknown.end(), files.begin(), files.end());
   std::ranges::sort(roles.unknown);
+  if (const auto series = series_in(folder)) roles.files.try_emplace("beads_stressed", *series);
   return roles;
 }
 

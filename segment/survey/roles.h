@@ -20,7 +20,8 @@ struct Roles {
 };
 
 /// A name tells by the words that laboratories use in it ("cell3_paxillin.tif", "beads_after_trypsin.tif"). Where two
-/// files fit a key, it stays open, and both are unknown.
-Roles roles_of(const std::vector<std::string>& names);
+/// files fit a key, it stays open, and both are unknown. The only folder whose name speaks of beads or of times and
+/// that has pictures has the stressed beads' frames.
+Roles roles_of(const std::filesystem::path& folder);
 
 }  // namespace mbtfm::survey

@@ -110,8 +110,8 @@ void look_at_pair(const CellImages& cell, double pixel_um, Survey& survey) {
   const images::Image& image = cell.beads_relaxed->image;
   const double shared = std::max(0.0, 1 - std::abs(look.shift_px.x) / image.width) *
                         std::max(0.0, 1 - std::abs(look.shift_px.y) / image.height);
-  survey.facts += "; bead images " + brief(norm(look.shift_px) * pixel_um) + " um apart, " + brief(100 * shared) +
-                  " % of the field in both";
+  survey.facts += "; stage moved " + brief(0.01 * std::round(100 * norm(look.shift_px) * pixel_um)) +
+                  " um between the bead images, " + brief(100 * shared) + " % of the field in both";
   constexpr double kLeastShared = 2.0 / 3;  // beads are followed up to a third of the image
   if (shared < kLeastShared)
     survey.doubts.push_back("Only " + brief(100 * shared) + " % of the field is in both bead images (limit " +

@@ -37,7 +37,7 @@ const Graph kMayInclude = {
     {"segment/cells", {"pipeline/contract", "pipeline/numerics", "pipeline/stage", "segment/images", "segment/rois"}},
     {"segment/beads", {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "segment/images"}},
     {"segment/survey",
-     {"pipeline/contract", "pipeline/charts", "pipeline/files", "pipeline/numerics", "pipeline/stage", "segment/images",
+     {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/report", "segment/images",
       "segment/beads", "segment/cells", "segment/stacks"}},
     {"segment/stacks",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "segment/images", "segment/beads"}},

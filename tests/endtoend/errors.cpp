@@ -235,8 +235,8 @@ TEST_F(Errors, what_was_probably_meant_is_named) {
 TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) {
   EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string()).output, " beads, "));
   EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string() + " --json").output, "\"fine\":true"));
-  EXPECT_TRUE(has_words(files::read_text(cell_ / "check.html"), "alt=\"actin\"", "beads, relaxed and stressed",
-                        "class=\"fine\""));
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "check.html"), "alt=\"actin image\"", "beads, relaxed and stressed",
+                        "class=\"good\""));
   files::write_text(cell_ / "check.html", "the user's own");
   EXPECT_TRUE(has_words(run_program("mbtfm check " + cell_.string()).output, "did not make it"));
   fs::remove(cell_ / "check.html");
@@ -360,6 +360,15 @@ TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
   expect_error(kUsage, {"youngs_modulus_kPa"}, "4_fit");
   replace_in_toml("# youngs_modulus_kPa", "youngs_modulus_kPa = 8.4");
   EXPECT_TRUE(has_words(output_of("mbtfm run --preset fast " + cell_.string()), "total force "));
+}
+
+TEST_F(Errors, init_takes_a_folder_of_bead_images_for_a_series) {
+  fs::remove(cell_ / "cell.toml");
+  fs::create_directory(cell_ / "Frames");
+  fs::rename(cell_ / "beads_stressed.tif", cell_ / "Frames/t1.tif");
+  fs::copy(cell_ / "Frames/t1.tif", cell_ / "Frames/t2.tif");
+  output_of("mbtfm init " + cell_.string());
+  EXPECT_TRUE(has_words(files::read_text(cell_ / "cell.toml"), "\nbeads_stressed = \"Frames\"", "2 pictures"));
 }
 
 }  // namespace

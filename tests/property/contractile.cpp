@@ -3,6 +3,8 @@
 
 #include <Eigen/Dense>
 
+#include "mbtfm/tensions/ensemble.h"
+#include "substrate/loads.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::tensions {
@@ -66,27 +68,70 @@ MatrixXd ring_and_chords(const Cell& cell) {
   return forces;
 }
 
-TEST(Contractile, a_model_that_is_linear_is_fitted_as_linear_least_squares_has_it) {
-  const Cell cell = test::round_cell(14, 12);
-  // gel, beads and noise of the scene; its network is not asked
-  test::TensionScene scene = test::scene_of(cell, Eigen::VectorXd::Constant(1, 0.5), 2000, 0.1, 5);
-  const MatrixXd forces = ring_and_chords(cell);
-  const VectorXd truth = Eigen::Vector3d(2, 5, 3);
-  scene.displacement_um = scene.compliance_um_per_nN * (forces * truth);
-  scene.largest_um = scene.displacement_um.cwiseAbs().maxCoeff();
-  test::measure(scene, 0.05, 11);
+/// A round cell whose ropes run from its adhesions over a nucleus, which pushes the gel down on an ellipse of its own.
+struct CellInSpace {
+  Cell cell = test::round_cell(14, 12);
+  std::vector<int> ids;
+  MatrixXd forces;  ///< of unit tensions: x, y and z, into the gel
+  VectorXd true_nN;
 
-  const std::vector<Ropes> models{Ropes(scene.adhesion_ids, forces)};
-  const EnsembleFit fit = fit_ensemble(models, scene.data, scene.adhesion_ids, {.loss = Loss::squares}, 2);
+  CellInSpace() {
+    Adhesion nucleus = cell.adhesions.front();
+    nucleus.adhesion_id = 99;
+    nucleus.position_um = {30, 30};
+    nucleus.major_axis_um = nucleus.minor_axis_um = 6;
+    const auto n = static_cast<int>(cell.adhesions.size());
+    forces = MatrixXd::Zero(3 * (n + 1), 3);
+    for (int a = 0; a < n; ++a) {
+      constexpr double kTop_um = 5;
+      const Vec2 d = nucleus.position_um - cell.adhesions[a].position_um;
+      const Eigen::Vector3d along = Eigen::Vector3d(d.x, d.y, -kTop_um).normalized();
+      forces.block<3, 1>(3 * a, a % 3) += along;
+      forces.block<3, 1>(3 * n, a % 3) -= along;
+    }
+    cell.adhesions.push_back(nucleus);
+    for (const Adhesion& a : cell.adhesions) ids.push_back(a.adhesion_id);
+    true_nN = forces * Eigen::Vector3d(2, 5, 3);
+  }
 
-  const double sigma_um = scene.beads.front().sigma_um;
-  const MatrixXd J = scene.compliance_um_per_nN * forces / sigma_um;
-  VectorXd y(J.rows());
-  for (std::size_t b = 0; b < scene.beads.size(); ++b)
-    y.segment<2>(2 * static_cast<Eigen::Index>(b)) << scene.beads[b].displacement_um.x / sigma_um,
-        scene.beads[b].displacement_um.y / sigma_um;
+  /// By beads in a layer below the surface, as a stack shows them. @param false_um  of one bead, into the gel
+  LinearData measured(unsigned seed, double false_um = 0) const {
+    constexpr int kBeads = 1500;
+    constexpr double kNoise_um = 0.05;
+    test::Normal normal(seed);
+    std::vector<Vec3> beads;
+    LinearData data{.has_errors = true, .dimension = 3};
+    for (int b = 0; b < kBeads; ++b) {
+      beads.push_back({30 + 8 * normal(), 30 + 8 * normal(), 0.2 + std::abs(normal())});
+      data.position_um.push_back({beads.back().x, beads.back().y});
+      data.height_um.push_back(-beads.back().z);
+    }
+    const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 2);
+    const substrate::Loads loads{substrate::ellipses_of(cell.adhesions), 3};
+    data.response = gel->response(loads, {beads, substrate::Components::all})->kept();
+    data.displacement_um = data.response->displace(true_nN);
+    for (double& u : data.displacement_um) u += kNoise_um * normal();
+    data.displacement_um[2] += false_um;
+    data.n_used = data.displacement_um.size();
+    data.weight_per_um = VectorXd::Constant(data.n_used, 1 / kNoise_um);
+    return reweighted(std::move(data), VectorXd::Ones(kBeads));
+  }
+
+  /// Two networks that are not the truth.
+  std::vector<Ropes> others(unsigned seed) const {
+    test::Normal normal(seed);
+    const auto other = [&] { return Ropes(ids, forces.unaryExpr([&](double f) { return f * (1 + 0.2 * normal()); })); };
+    return {other(), other()};
+  }
+};
+
+/// A fit of ropes against linear least squares.
+void expect_least_squares(const std::vector<Ropes>& models, const LinearData& data, const MatrixXd& forces,
+                          const std::vector<int>& adhesion_ids) {
+  const EnsembleFit fit = fit_ensemble(models, data, adhesion_ids, {.loss = Loss::squares}, 2);
+  const MatrixXd J = data.weight_per_um.asDiagonal() * data.response->displace(forces);
   const MatrixXd covariance = (J.transpose() * J).inverse();
-  const VectorXd expected = covariance * (J.transpose() * y);
+  const VectorXd expected = covariance * (J.transpose() * data.weight_per_um.cwiseProduct(data.displacement_um));
   ASSERT_TRUE(fit.report.converged);
   for (int i = 0; i < 3; ++i) {
     const double sigma = std::sqrt(covariance(i, i) * fit.misfit.variance);
@@ -96,6 +141,52 @@ TEST(Contractile, a_model_that_is_linear_is_fitted_as_linear_least_squares_has_i
     EXPECT_NEAR(interval_95(fit.tensions.nN[i]).high - expected[i], 1.96 * sigma, 0.07 * sigma);
   }
   EXPECT_NEAR((fit.forces.nN - forces * values_of(fit)).norm(), 0, 1e-9 * fit.forces.nN.norm());
+}
+
+TEST(Contractile, a_model_that_is_linear_is_fitted_as_linear_least_squares_has_it) {
+  const Cell cell = test::round_cell(14, 12);
+  // gel, beads and noise of the scene; its network is not asked
+  test::TensionScene scene = test::scene_of(cell, Eigen::VectorXd::Constant(1, 0.5), 2000, 0.1, 5);
+  const MatrixXd forces = ring_and_chords(cell);
+  scene.displacement_um = scene.compliance_um_per_nN * (forces * Eigen::Vector3d(2, 5, 3));
+  scene.largest_um = scene.displacement_um.cwiseAbs().maxCoeff();
+  test::measure(scene, 0.05, 11);
+  expect_least_squares({Ropes(scene.adhesion_ids, forces)}, scene.data, forces, scene.adhesion_ids);
+}
+
+TEST(Contractile, is_fitted_in_space_as_in_the_plane) {
+  const CellInSpace scene;
+  expect_least_squares({Ropes(scene.ids, scene.forces)}, scene.measured(3), scene.forces, scene.ids);
+}
+
+/// What the beads show beside the networks is found, and the errors hold it.
+TEST(Contractile, has_forces_in_space_within_their_errors) {
+  const CellInSpace scene;
+  constexpr int kDraws = 10;
+  double of_forces = 0, of_total = 0;
+  for (unsigned draw = 0; draw < kDraws; ++draw) {
+    const EnsembleFit fit =
+        fit_ensemble(scene.others(100 + draw), scene.measured(300 + draw), scene.ids, {.loss = Loss::squares}, 2);
+    for (std::size_t a = 0; a < scene.ids.size(); ++a) {
+      const Estimate& found = fit.forces.magnitudes[a];
+      const double error_nN = found.value - scene.true_nN.segment<3>(3 * static_cast<Index>(a)).norm();
+      of_forces += std::pow(error_nN / found.standard_error, 2) / (kDraws * static_cast<double>(scene.ids.size()));
+    }
+    const double error_nN = fit.total_force_nN.value - total_nN(scene.true_nN, 3);
+    of_total += std::pow(error_nN / fit.total_force_nN.standard_error, 2) / kDraws;
+  }
+  EXPECT_LT(of_forces, 1.5);
+  EXPECT_LT(of_total, 2.3);  // of ten draws: one in a hundred is above
+}
+
+TEST(Contractile, is_moved_by_no_false_bead_in_space) {
+  const CellInSpace scene;
+  const EnsembleFit sound = fit_ensemble(scene.others(1), scene.measured(4), scene.ids, {}, 2);
+  const EnsembleFit fit = fit_ensemble(scene.others(1), scene.measured(4, 4), scene.ids, {}, 2);
+  EXPECT_EQ(sound.misfit.loss, Loss::squares);
+  EXPECT_EQ(fit.misfit.loss, Loss::huber);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(values_of(fit)[i], values_of(sound)[i], 0.3 * sound.tensions.nN[i].standard_error) << i;
 }
 
 }  // namespace

@@ -156,32 +156,6 @@ TEST(Plan, a_percentage_without_its_sign_is_refused_and_named) {
 
 const Gel kGel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.49, .thickness_um = 60};
 
-double mean_left_um4(double area_um2, double distance_um) {
-  const SquaresLeft left = squares_left(kGel, area_um2, distance_um);
-  return (left.along_um4 + left.across_um4) / 2;
-}
-
-/// Squares of 1/r over an area have no length in them.
-TEST(AdhesionPair, the_squares_left_do_not_change_where_all_lengths_grow) {
-  for (const double distance_um : {0.8, 2.0, 10.0}) {
-    const double small = mean_left_um4(0.4, distance_um), large = mean_left_um4(1.6, 2 * distance_um);
-    EXPECT_NEAR(large, small, 1e-9 * small) << distance_um;
-  }
-}
-
-/// One of two far apart is missed altogether, and its field is 1/r between its radius and their distance.
-TEST(AdhesionPair, the_squares_left_rise_with_the_distance_and_far_off_with_its_logarithm) {
-  double before = 0;
-  for (const double distance_um : {1.2, 2.0, 4.0, 8.0}) {
-    const double squares = mean_left_um4(1, distance_um);
-    EXPECT_GT(squares, before);
-    before = squares;
-  }
-  const auto step = [](double from_um) { return mean_left_um4(1, 2 * from_um) - mean_left_um4(1, from_um); };
-  // 2 pi <|u|² r²> ln 2 for each doubling, but for what the free place and force of the one still explain of the other
-  EXPECT_NEAR(step(16) / step(8), 1, 0.1);
-}
-
 /// One of all densities that are asked of: the fields of the pairs, which take the time, are those of each.
 constexpr double kArea_um2 = 0.46;
 enum Density : std::size_t { of_1, of_128, of_512, of_a_tenth, of_10 };

@@ -1,5 +1,5 @@
 /// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for notes/validation.md. Studies:
-/// descent, noise, deviations, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts
+/// descent, noise, deviations, beside-fttc, directions, types. A table (CSV) on stdout; charts
 /// (SVG) into the folder.
 #include <chrono>
 #include <cstdlib>
@@ -366,93 +366,6 @@ void beside_fttc(const Arguments& a) {
           arrows("FTTC, 25 % noise", cell, at_adhesions(cell, by_fttc), kScale_um_per_nN, 640) + "</svg>\n");
 }
 
-Network relabelled(Network network, const std::vector<int>& removed) {
-  for (Link& link : network.links)
-    if (std::find(removed.begin(), removed.end(), link.fibre_id) != removed.end()) link.fibre_id = 0;
-  return network;
-}
-
-// Fig. 3.7: fibres too many and too few, on the same mesh.
-void segmentation(const Arguments& a) {
-  std::printf("cell,case,relative_l2,expected_l2,change_of_others_nN,largest_extra_nN\n");
-  std::map<std::string, test::Series> misfits, changes;  // over the cells
-  for (int c = 1; c <= a.n_cells; ++c) {
-    Cell cell = drawn_cell(static_cast<std::uint64_t>(c));
-    const std::size_t n_true = cell.fibres.size();
-    std::mt19937_64 random(static_cast<std::uint64_t>(c));
-    for (int extra = 0; extra < 3; ++extra) {
-      const int start = 1 + static_cast<int>(random() % cell.adhesions.size());
-      int end = start;
-      while (end == start) end = 1 + static_cast<int>(random() % cell.adhesions.size());
-      test::add_ventral(cell, start, end);
-    }
-    const Eigen::VectorXd true_tensions = test::thesis_tensions_nN(n_true, static_cast<std::uint64_t>(c));
-    Eigen::VectorXd with_extra = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(n_true) + 4, true_tensions[0]);
-    with_extra.head(true_tensions.size()) = true_tensions;  // the extra ones are plain network
-    TensionScene scene = test::scene_of(cell, with_extra, 5000, 0, static_cast<unsigned>(c));
-    const Network whole = scene.cables.network();
-    const int n = static_cast<int>(n_true);
-    std::vector<int> dorsal, ventral;
-    for (std::size_t i = 0; i < n_true; ++i) {
-      if (cell.fibres[i].type == FibreType::dorsal) dorsal.push_back(cell.fibres[i].fibre_id);
-      if (cell.fibres[i].type == FibreType::ventral) ventral.push_back(cell.fibres[i].fibre_id);
-    }
-    std::map<int, double> right;  // tensions with the true fibres
-    const std::vector<int> extras = {n + 1, n + 2, n + 3};
-    std::vector<int> without_dorsal = extras, without_ventral = extras;
-    without_dorsal.insert(without_dorsal.end(), dorsal.begin(), dorsal.begin() + 2);
-    without_ventral.push_back(ventral.front());
-    double place = -1.5;
-    for (const auto& [name, removed] : {std::pair<const char*, std::vector<int>>{"right", extras},
-                                        {"three too many", {}},
-                                        {"two dorsal missing", without_dorsal},
-                                        {"one ventral missing", without_ventral}}) {
-      scene.cables = cables::CableNetwork(relabelled(whole, removed));
-      test::measure(scene, 0.01, static_cast<unsigned>(c));
-      const tensions::EnsembleFit fit = test::fit_own_network(scene);
-      double change = 0, largest = 0, expected = 0, measured = 0;
-      int m = 0;
-      for (std::size_t i = 1; i < fit.tensions.fibre_ids.size(); ++i) {
-        const int id = fit.tensions.fibre_ids[i];
-        if (id > n) largest = std::max(largest, fit.tensions.nN[i].value);
-        if (id > n) continue;
-        if (std::strcmp(name, "right") == 0) right[id] = fit.tensions.nN[i].value;
-        change += std::pow(fit.tensions.nN[i].value - right[id], 2);
-        ++m;
-      }
-      for (const Bead& b : scene.beads)
-        measured += dot(b.displacement_um, b.displacement_um), expected += 2 * b.sigma_um * b.sigma_um;
-      std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, tensions::relative_l2(fit.data, fit.forces.nN),
-                  std::sqrt(expected / measured), std::sqrt(change / m), largest);
-      for (auto [series, value] :
-           {std::pair{&misfits, tensions::relative_l2(fit.data, fit.forces.nN) / std::sqrt(expected / measured)},
-            std::pair{&changes, std::sqrt(change / m)}}) {
-        (*series)[name].name = name;
-        (*series)[name].is_line = false;
-        (*series)[name].x.push_back(c + 0.1 * place);  // side by side
-        (*series)[name].y.push_back(value);
-      }
-      ++place;
-    }
-  }
-  const auto values_of = [](const std::map<std::string, test::Series>& map) {
-    std::vector<test::Series> list;
-    for (const auto& [name, series] : map) list.push_back(series);
-    return list;
-  };
-  save(a, "segmentation",
-       {{.title = "misfit",
-         .x_label = "cell",
-         .y_label = "relative L2 over the noise's",
-         .series = values_of(misfits),
-         .is_x_counted = true},
-        {.title = "the other tensions",
-         .x_label = "cell",
-         .y_label = "rms change (nN)",
-         .series = values_of(changes),
-         .is_x_counted = true}});
-}
-
 // Fig. 3.10: directions of the model's forces against those found without it.
 void directions(const Arguments& a) {
   std::vector<double> isotropic, full;
@@ -535,13 +448,9 @@ int main(int argc, char** argv) {
   const Arguments a{.n_repeats = argc > 2 ? std::atoi(argv[2]) : 10,
                     .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
                     .folder = argc > 4 ? argv[4] : "."};
-  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {{"descent", descent},
-                                                                        {"noise", noise},
-                                                                        {"deviations", deviations},
-                                                                        {"beside-fttc", beside_fttc},
-                                                                        {"segmentation", segmentation},
-                                                                        {"directions", directions},
-                                                                        {"types", types}};
+  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {
+      {"descent", descent},         {"noise", noise},           {"deviations", deviations},
+      {"beside-fttc", beside_fttc}, {"directions", directions}, {"types", types}};
   for (const auto& [name, run] : studies) {
     if (argc > 1 && std::strcmp(argv[1], name) == 0) {
       run(a);
@@ -549,7 +458,7 @@ int main(int argc, char** argv) {
     }
   }
   std::fprintf(stderr,
-               "tension_accuracy descent|noise|deviations|beside-fttc|segmentation|directions|types [repeats] "
+               "tension_accuracy descent|noise|deviations|beside-fttc|directions|types [repeats] "
                "[cells] [folder]\n");
   return 2;
 }
