@@ -250,7 +250,6 @@ BeadFit fit_beads(const Question& q, const DisplacementField& beads, const Gel& 
           .lattice = unknowns.lattice,
           .scene = std::move(scene),
           .solution = std::move(finest),
-          .tried_nN_per_um = fitter.table().sheet_nN_per_um(),
           .varied = std::move(varied),
           .misfit = misfit,
           .beads = std::move(state.beads),

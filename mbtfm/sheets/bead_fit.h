@@ -45,10 +45,9 @@ struct BeadFit {
   std::optional<ContractionLattice> lattice;
   sheet::Scene scene;        ///< with what was found
   sheet::Solution solution;  ///< of it, on the finest triangles
-  StiffnessRange tried_nN_per_um;
-  std::string varied;       ///< what a contraction that varies would change, in a sentence; empty: that is fitted
-  Misfit misfit;            ///< against the beads' noise, the mesh's error and the outline's
-  DisplacementField beads;  ///< where they were taken
+  std::string varied;        ///< what a contraction that varies would change, in a sentence; empty: that is fitted
+  Misfit misfit;             ///< against the beads' noise, the mesh's error and the outline's
+  DisplacementField beads;   ///< where they were taken
   Effect under_load;
   int n_parts = 1;
 };

@@ -17,18 +17,18 @@ bool is_used(const Residuals& r, std::size_t bead) { return r.weight_per_um(2 * 
 
 Neighbours neighbours_of(const Residuals& r, double near_um) {
   constexpr double kFewest = 6;  // of a hexagonal lattice
-  std::vector<Vec3> places;
+  std::vector<Vec2> places;
   std::vector<int> bead_of;
   for (std::size_t b = 0; b < r.position_um.size(); ++b)
     if (is_used(r, b)) {
-      places.push_back({r.position_um[b].x, r.position_um[b].y, 0});
+      places.push_back(r.position_um[b]);
       bead_of.push_back(static_cast<int>(b));
     }
   Neighbours near(r.position_um.size());
   if (places.empty()) return near;
   const double area_of_each_um2 = extent_of(places).area_um2() / static_cast<double>(places.size());
   const double radius_um = std::max(near_um, std::sqrt(kFewest * area_of_each_um2 / std::numbers::pi));
-  const numerics::Near found(places, radius_um);
+  const numerics::Neighbours<Vec2> found(places, radius_um);
   for (std::size_t k = 0; k < places.size(); ++k)
     for (const int other : found.within(places[k], radius_um, static_cast<int>(places.size())))
       if (other != static_cast<int>(k)) near[bead_of[k]].push_back(bead_of[other]);

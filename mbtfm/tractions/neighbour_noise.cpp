@@ -47,12 +47,10 @@ std::optional<Prediction> predicted(const DisplacementField& beads, int bead, co
 
 std::optional<double> noise_from_neighbours_um(const DisplacementField& beads) {
   if (beads.size() < kFewest || !(beads_per_um2(beads) > 0)) return std::nullopt;
-  std::vector<Vec3> places_um;
-  for (const Bead& b : beads) places_um.push_back({b.position_um.x, b.position_um.y, 0});
-  const numerics::Near near(places_um, std::sqrt(2 / beads_per_um2(beads)));
+  const numerics::Neighbours<Vec2> near(points_of(beads), std::sqrt(2 / beads_per_um2(beads)));
   std::vector<Prediction> predictions;
   for (int i = 0; i < std::ssize(beads); ++i) {
-    std::vector<int> neighbours = near.nearest(places_um[i], kNeighbours + 1);
+    std::vector<int> neighbours = near.nearest(beads[i].position_um, kNeighbours + 1);
     std::erase(neighbours, i);
     neighbours.resize(kNeighbours);
     if (const auto p = predicted(beads, i, neighbours)) predictions.push_back(*p);
