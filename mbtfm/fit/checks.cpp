@@ -95,7 +95,7 @@ Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
 
 std::vector<std::string> names_of_groups(const EnsembleFit& fit) {
   std::vector<std::string> names;
-  for (const FibreGroup& group : fibres_not_told_apart(fit)) {
+  for (const FibreGroup& group : fibres_not_distinguished(fit)) {
     std::string& text = names.emplace_back();
     for (std::size_t k = 0; k < group.indices.size(); ++k)
       text += (k > 0 ? " + " : "") + std::to_string(fit.tensions.fibre_ids[group.indices[k]]);

@@ -14,7 +14,7 @@ MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const VectorXd& ten
 
 /// The weighted residuals of a trial, each made as large as if the fit did not follow its bead: (1 − H)^(−1/2) r, H the
 /// bead's 2 × 2 block of the hat matrix of motions and tensions, those at zero held there (Cook & Weisberg, Residuals
-/// and Influence in Regression, 1982, 2.2). Beside an adhesion a single bead may tell half of its force.
+/// and Influence in Regression, 1982, 2.2). A single bead near an adhesion may determine half of its force.
 struct Studentized {
   VectorXd residual;  ///< 2·beads
   VectorXd leverage;  ///< by bead: trace of H; they add up to the number of unknowns
