@@ -31,7 +31,7 @@ std::optional<CrossValidation> cross_validation_of(const ReadyCell& ready, const
 }
 
 /// A fit of a sheet takes as long as that of the cell. It is worth it if fibres are in doubt: the network alone does as
-/// well by BIC, or bears more than half of the force.
+/// well by BIC, or carries more than half of the force.
 bool is_sheet_asked(Switch asked, const std::vector<ModelScore>& models, const EnsembleFit& fit) {
   if (asked != Switch::automatic) return asked == Switch::on;
   const auto bic_of = [&](const char* name) {
