@@ -89,8 +89,8 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   }
   tractions::TractionParameters penalised = traction;
   if (!has_background && !traction.lambda_um_per_kPa) {
-    // Few numbers that the beads tell well: least squares. Criteria of lambda take the half of them that is felt least
-    // for noise, with whatever pulls there.
+    // Few numbers that the beads determine well: least squares. Criteria of lambda take the half of them that is felt
+    // least for noise, with whatever pulls there.
     constexpr double kNone = 1e-6;
     const VectorXd even = VectorXd::Ones(response.rows());
     const auto spectrum = spectrum_of(problem, response, even, static_cast<double>(response.rows()), threads);
