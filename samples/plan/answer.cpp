@@ -55,7 +55,7 @@ std::string checked_with(const Drawn& d, const std::string& density, const std::
                   sentence(verdict));
 }
 
-/// Whether two of them are told apart. @param touching_um  below it they touch
+/// Whether two of them are resolved. @param touching_um  below it they touch
 std::string apart(std::optional<double> least_distance_um, double touching_um) {
   if (!least_distance_um) return sentence("plan.never-apart");
   return sentence(*least_distance_um > touching_um ? "plan.apart" : "plan.apart-touching", about(*least_distance_um));

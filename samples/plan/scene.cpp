@@ -24,7 +24,7 @@ namespace mbtfm::plan {
 
 namespace {
 
-/// No fibre of a cell pulls less in the simulator; and one that hangs loose tells nothing of what a taut one shows.
+/// No fibre of a cell pulls less in the simulator; and a loose one shows nothing of a taut one's effect.
 constexpr double kLeastTension_nN = 0.05;
 
 Extent whole_field(const drawing::MicroscopeParameters& m) {
