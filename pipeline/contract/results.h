@@ -57,7 +57,7 @@ struct MissingAdhesion {
 struct ErrorParts {
   double beads = 0;               ///< noise of the displacements
   double segmentation = 0;        ///< shift, area and angle of the adhesions; free ends of the fibres
-  std::optional<double> mesh{};   ///< one network is not another; none: a single mesh tells nothing of it
+  std::optional<double> mesh{};   ///< one network is not another; none: a single mesh shows nothing of it
   double substrate = 0;           ///< discretisation of the gel, or what its model leaves out
   double solver = 0;              ///< where the iterations stopped
   double model = 0;               ///< what the misfit calls for beside the beads' noise and the mesh
