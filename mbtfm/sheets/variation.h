@@ -11,7 +11,7 @@
 
 namespace mbtfm::sheets {
 
-/// By so much of itself the contraction of a sheet may vary over it. Beads do not tell it: a sheet that pulls more at
+/// By so much of itself the contraction of a sheet may vary over it. Beads do not show it: a sheet that pulls more at
 /// its edge moves its gel as an even, softer one.
 inline constexpr double kVariation = 0.2;
 
