@@ -15,7 +15,7 @@ namespace mbtfm::inverse {
 /// Directions in which the risk looks for a signal.
 enum class SignalIn {
   felt,     ///< all that move the data: (15)
-  resolved  ///< those that the data tell from noise: (15b)
+  resolved  ///< those that the data distinguish from noise: (15b)
 };
 
 /// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu. Values of AᵀA below 1e-12 of the largest are rounding, and none here.
@@ -64,7 +64,7 @@ class Spectrum {
                   std::optional<double> stated_variance, SignalIn signal_in) const;
   double misfit_in_frame(const Eigen::ArrayXd& shares) const;
   MatrixXd outer(const Eigen::ArrayXd& shares) const;
-  /// Directions that the data tell from noise. @param variance  of one datum
+  /// Directions that the data distinguish from noise. @param variance  of one datum
   Eigen::Array<bool, Eigen::Dynamic, 1> is_resolved(double variance) const;
   std::vector<double> risks_of_resolved(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
   double data_squared_, n_data_;
