@@ -151,7 +151,7 @@ CellStages stages_as_sheet(const fs::path& cell, const ImageNames& images, const
   if (settings.bundles) read_file(last, "bundles", "1_segment/fibre_points.csv");
   of.why += "; its outline is found in the images";
   of.stages = {std::move(segment), std::move(track), std::move(last)};
-  of.first = {0};  // where the cell holds its gel tells which bead is which
+  of.first = {0};  // where the cell holds its gel shows which bead is which
   of.chains = {{1}};
   return of;
 }
@@ -213,7 +213,7 @@ CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   if (of.why.empty()) {
     of.kind = CellKind::plane;
     of.stages = stages();
-    of.first = {0};  // where the cell holds its gel tells which bead is which
+    of.first = {0};  // where the cell holds its gel shows which bead is which
     of.chains = {{1}, {2}};
     return of;
   }
