@@ -30,7 +30,7 @@ struct RelativeError {
   double total = 0;
   double beads = 0, segmentation = 0, model = 0;
   double unavoidable = 0;   ///< beads and segmentation together: no amount of computing lowers it
-  bool is_complete = true;  ///< one mesh tells nothing of the mesh's part
+  bool is_complete = true;  ///< one mesh shows nothing of the mesh's part
 };
 /// @throws InvalidData where no fibre pulls
 RelativeError relative_error(const ErrorBudget& budget);

@@ -60,7 +60,7 @@ std::string of_candidates(const Cell& cell) {
              : " " + sentence("cell.candidates-too");
 }
 
-/// Where the beads do not tell the network's tension, its part of the force may come out at any size.
+/// If the beads do not determine the network's tension, its part of the force may come out at any size.
 std::string parts_of_total(const CellResults& results) {
   const auto network = results.tensions.find(0);
   if (network != results.tensions.end() && !network->second.identifiable) return sentence("cell.network-unresolved");

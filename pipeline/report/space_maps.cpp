@@ -141,7 +141,7 @@ struct Paper {
   Vec2 px(Vec3 um) const { return px(seen(um).at); }
 };
 
-/// Heights on a coarser lattice where there are more than the eye tells apart.
+/// Heights on a coarser lattice if there are more than the eye resolves.
 struct Heights {
   const HeightMap& map;
   int step = 1;
@@ -187,7 +187,7 @@ void add_facets(const Heights& heights, const TractionsBetween& field, const Col
   }
 }
 
-/// The strongest fifth, so that they can be told apart; none below a tenth of the largest.
+/// The strongest fifth, so that they can be distinguished; none below a tenth of the largest.
 std::vector<const SurfaceTraction*> shown_arrows(const SpaceResults& results) {
   std::vector<const SurfaceTraction*> all;
   for (const SurfaceTraction& t : results.tractions) all.push_back(&t);
