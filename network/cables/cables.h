@@ -29,7 +29,7 @@ struct CableParameters {
   static constexpr int kConjugateSteps = 1'000'000;  ///< ordinary cells take 7 000 to 200 000
   /// EA: force at 100 % strain beyond the rest length (thesis 3.2.3); 0: cables are never longer than they like
   double axial_stiffness_nN = 50;
-  double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can tell
+  double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can resolve
   double force_tolerance = 1e-9;        ///< largest net force on a free vertex, relative to the largest tension
   std::optional<int> max_iterations{};  ///< or kNewtonSteps, kConjugateSteps
   Contraction contraction = Contraction::newton;

@@ -182,8 +182,8 @@ class Descent {
   const FreeVertices& free_;
   const std::vector<Cable>& cables_;
   Rounding rounding_;
-  // Spans are state beside the positions: a collapsed cable is a millionth of an edge long, and its force depends on
-  // its direction, which the difference of two rounded positions does not tell.
+  // Spans are state besides the positions: a collapsed cable is a millionth of an edge long, and its force depends on
+  // its direction, which the difference of two rounded positions does not give.
   std::vector<Vec2> x_, span_, change_;
   std::vector<Pull> pull_, trial_;     // by cable, here and where the line search last tried
   std::vector<Vec2> gradient_, step_;  // by vertex, zero where it is held
