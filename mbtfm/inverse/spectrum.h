@@ -24,7 +24,7 @@ class Spectrum {
   /// @param normal   AᵀA; what is below its diagonal does not count
   /// @param adjoint  Aᵀu
   Spectrum(MatrixXd normal, const VectorXd& adjoint, double data_squared, double n_data);
-  /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise beside: criteria
+  /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise added: criteria
   /// then are what they are expected to be. Of solve() nothing holds but the size.
   /// @param variance  of one datum
   Spectrum with_noise(double variance) const;
@@ -32,7 +32,7 @@ class Spectrum {
   /// @param stated_variance  of one datum
   LambdaScan scan(std::optional<double> stated_variance, SignalIn signal_in) const;
   /// Of one datum, of the half of the directions that is felt least, where it is larger than noise alone would have it
-  /// beside what no s can follow: there is an error of A itself then, which s can follow, and which no criterion with
+  /// besides what no s can follow: there is an error of A itself then, which s can follow, and which no criterion with
   /// white noise knows. None where they agree, or no data are left beside. Where a signal reaches so far down it is
   /// taken for such an error, and lambda is too large.
   std::optional<double> variance_felt_least() const;

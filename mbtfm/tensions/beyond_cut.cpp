@@ -189,7 +189,7 @@ namespace {
 
 /// The motions by random forces Z that stand out of the noise, of unit variance.
 MatrixXd motions_that_stand_out(const LinearData& data, const MatrixXd& Z, double kappa) {
-  // What together stands out by a tenth of the noise of one component changes no weight by a per cent.
+  // What together exceeds the noise by a tenth of one component's changes no weight by a per cent.
   constexpr double kUnseen = 0.01;
   const MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
   const auto [values, vectors] = numerics::symmetric_eigen(square);

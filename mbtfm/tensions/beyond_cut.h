@@ -45,7 +45,7 @@ struct ForcesBeyond {
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
   double intensity_nN_per_um = 0;
-  /// Adhesions so near to the cut that they may have forces beside the network's, and the standard deviation of a
+  /// Adhesions so near to the cut that they may have forces besides the network's, and the standard deviation of a
   /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
   Index n_own = 0;
   double own_nN = 0;
@@ -56,10 +56,10 @@ struct DataWithBeyond {
   LinearData data;
   ForcesBeyond beyond;
 };
-/// The data with these motions beside those that they have. The forces are taken for random, independent of each other
+/// The data with these motions besides those that they have. The forces are taken for random, independent of each other
 /// and of one intensity: the one that makes the data most likely, whatever the forces inside of the image are
 /// (restricted maximum likelihood; Patterson & Thompson, Biometrika 58 (1971) 545), but no less than that of the forces
-/// in view. An even traction of any size is allowed for beside them. What lies out there pulls the image's border
+/// in view. An even traction of any size is allowed for besides them. What lies out there pulls the image's border
 /// outwards or inwards as a growth would: growth and shears are from here on expected to be of usual size
 /// (kUsualGrowth).
 /// @param data  whose motions are affine_motions(), of precision 0, or none

@@ -20,7 +20,7 @@ namespace {
 
 using substrate::Ellipse;
 
-/// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.
+/// Sums of forces that have a budget of their own besides the tensions, by force: the total; through the cut, if any.
 MatrixXd sums_of(const EnsembleFit& fit) {
   MatrixXd sums = directions_of(adhesion_forces_nN(fit));
   if (!fit.cut) return sums;

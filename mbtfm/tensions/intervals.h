@@ -17,7 +17,7 @@ struct LocalMisfit {
   VectorXd tensions_nN;
   MatrixXd H;                    ///< Jᵀ J
   VectorXd g;                    ///< Jᵀ r
-  MatrixXd model_variance = {};  ///< of g by the error of the model, beside that of the noise; empty: none
+  MatrixXd model_variance = {};  ///< of g by the error of the model, besides that of the noise; empty: none
 };
 LocalMisfit local_misfit(const Trial& trial, const MatrixXd& jacobian);
 

@@ -42,7 +42,7 @@ struct Motions {
                           ///< 2·adhesions × motions; empty: none
 };
 
-/// These beside those: each stays what it is.
+/// These besides those: each stays what it is.
 Motions joined(Motions those, const Motions& these);
 /// The same, ahead of the last of those.
 Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);

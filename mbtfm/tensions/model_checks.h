@@ -53,7 +53,7 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 constexpr std::size_t kMostMissingFibres = 24;
 
 /// The best ones, no adhesion twice, at most `kMostMissingFibres`, found together: tensions and gains are of each
-/// beside the others. A gain is kept where chance would reach it in one cell of a hundred, all pairs tried
+/// given the others. A gain is kept where chance would reach it in one cell of a hundred, all pairs tried
 /// (Bonferroni), errors of the model and of the segmentation counted.
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          const SegmentationErrors& segmentation = {}, int threads = 1);

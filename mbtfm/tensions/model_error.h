@@ -74,7 +74,7 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
 /// @param force_variance  of the errors, by component, over s²
 ReducedData whitened(const ReducedData& data, const VectorXd& force_variance, int threads = 1);
 
-// Forces that the adhesions exert beside what the network gives them: the network is a model, and where it is wrong
+// Forces that the adhesions exert besides what the network gives them: the network is a model, and where it is wrong
 // the beads show it (Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001) 425). With e of model_error.h found and not only
 // allowed for,
 //

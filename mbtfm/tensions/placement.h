@@ -75,7 +75,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, Switch setting, int threads);
 
-/// What came of it beside the fit: shift x, y (um) and turn (rad) with standard errors.
+/// What came of it besides the fit: shift x, y (um) and turn (rad) with standard errors.
 struct FoundPlacement {
   Placement placement;
   Eigen::Vector3d sigma;

@@ -37,7 +37,7 @@ Vec2 unit_or_less(Vec2 v) {
   return squared > 1 ? (1 / std::sqrt(squared)) * v : v;
 }
 
-/// What a cable's force follows from, kept as unknowns of their own beside the positions and updated by the linearised
+/// What a cable's force follows from, kept as unknowns of their own besides the positions and updated by the linearised
 /// relations. Near the kinks they turn over far less within a step than the force as a function of position does, so
 /// that Newton's method takes full steps however sharp the kinks.
 struct Dual {
@@ -309,7 +309,7 @@ class ConjugateGradients : public Descent {
     last_gradient_ = gradient_;
     const double length = line_search(slope, -slope / curvature(), kConjugateReduction);
     move(length);
-    last_squares_ = length > 0 ? squares : 0;  // 0: begin anew along the gradient
+    last_squares_ = length > 0 ? squares : 0;  // 0: restart along the gradient
     n_stuck_ = length > 0 ? 0 : n_stuck_ + 1;
     return n_stuck_ < 2;
   }

@@ -36,7 +36,7 @@ struct Adhesion {
   std::optional<double> edge_distance_um{};  ///< from the centre to the outline, holes included; none: not stated
   std::optional<double> probability{};       ///< that it is an adhesion, by the image; none: not known
 };
-/// A candidate of a hexagonal lattice stands for its cell, which is larger than the disc drawn into it; any other
+/// A candidate of a hexagonal lattice represents its cell, which is larger than the disc drawn into it; any other
 /// adhesion for its own area.
 double area_stood_for_um2(const Adhesion& adhesion);
 

@@ -1,5 +1,5 @@
 /// As accurate as asked for, at the least cost: presets are tried from the cheapest on, and each answer's error budget
-/// says whether it is accurate enough, or what stands in the way.
+/// says whether it is accurate enough, or what prevents it.
 #pragma once
 
 #include <filesystem>

@@ -25,7 +25,7 @@ Chart new_map(const SpaceResults& r, const std::string& title) {
   return empty_map({low - half, high + half}, title);
 }
 
-/// Every vertex stands for a cell of the lattice.
+/// Every vertex represents a cell of the lattice.
 template <class Value, class Colour>
 void draw_cells(Chart& map, const SpaceResults& r, const Value& value, const Colour& colour, const std::string& unit) {
   const Vec2 half = 0.5 * spacing_of(r);

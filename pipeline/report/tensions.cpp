@@ -140,7 +140,7 @@ std::vector<std::string> network_row(const CellResults& results, const Tension& 
   return row;
 }
 
-/// The true fibres that no found one stands for, as a sentence.
+/// The true fibres that no found one matches, as a sentence.
 std::string missed_fibres(const Comparison& comparison) {
   std::string list;
   for (const ComparedFibre& fibre : comparison.fibres) {

@@ -93,7 +93,7 @@ std::string why_in_space(const fs::path& cell, const toml::table& toml) {
   return {};
 }
 
-/// What is seen of the cell beside its beads is laid onto the surface from above.
+/// What is seen of the cell besides its beads is laid onto the surface from above.
 bool has_cell(const fs::path& cell, const ImageNames& images) {
   return has_image(cell, images, "adhesion") || has_image(cell, images, "actin") || files::is_own_file(cell / kOutline);
 }

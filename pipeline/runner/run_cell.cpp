@@ -322,7 +322,7 @@ class CellRun {
   const RunOptions& options_;
   ImageNames images_;
   CellStages of_;
-  std::vector<Setting> given_;  // beside cell.toml
+  std::vector<Setting> given_;  // besides cell.toml
   Settings settings_;
   HashCache hashes_;
   std::mutex saying_;

@@ -97,7 +97,7 @@ ordered_json stage_entry(const Stage& stage, const StageOutcome& recorded, const
   return entry;
 }
 
-/// The file that each key of [images] stands for.
+/// The file that each key of [images] names.
 ordered_json images_in(const fs::path& cell) {
   const ImageNames names = read_image_names(cell);
   ordered_json images = ordered_json::object();

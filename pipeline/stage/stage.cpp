@@ -97,7 +97,7 @@ std::vector<std::string> arguments_of(int argc, char** argv, const ParameterList
     const std::string table = argument.substr(2, point - 2), key = argument.substr(point + 1, end - point - 1);
     const auto meant =
         std::ranges::find_if(list.all(), [&](const Parameter& p) { return p.table == table && p.name == key; });
-    if (meant != list.all().end()) argument.replace(2, end - 2, meant->flag);  // else it is refused as it stands
+    if (meant != list.all().end()) argument.replace(2, end - 2, meant->flag);  // else it is refused as it is
   }
   return arguments;
 }
@@ -304,7 +304,7 @@ void commit(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) files::put_in_place(temporary, destination);
 }
 
-/// What was noticed, doubted and assumed beside what the stage itself reports.
+/// What was noticed, doubted and assumed besides what the stage itself reports.
 void add_findings(StageReport& report, const StageContext& context) {
   std::vector<Finding> findings;
   for (const Doubt& doubt : context.doubts) {

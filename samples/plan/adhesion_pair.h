@@ -43,7 +43,7 @@ struct PairDraws {
 class PairResolution {
  public:
   PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um2, int threads);
-  /// Of beads in a volume, which move along z, too, and forces into the gel beside those along it: where nothing else
+  /// Of beads in a volume, which move along z, too, and forces into the gel besides those along it: where nothing else
   /// pulls.
   PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um3, const BeadVolume& volume,
                  const PairDraws& draws, int threads);

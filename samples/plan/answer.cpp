@@ -133,7 +133,7 @@ std::string needed_text(const SpacePlan& plan, std::optional<double> beads_per_u
                        : "more than " + about(most_beads_per_um3(plan.asked.densities));
 }
 
-/// Standard errors allow for tractions beside the patches. Where there are none, experiments err by less.
+/// Standard errors allow for tractions besides the patches. If there are none, experiments err by less.
 std::string about_drawn_in_space(const Drawn& d) {
   const double allowed = allowed_of(d);
   const char* verdict = d.error_over_predicted > 1 + allowed   ? "plan.does-not-hold"

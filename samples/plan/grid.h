@@ -11,7 +11,7 @@ namespace mbtfm::plan {
 /// No more beads can be resolved: their images melt together.
 double most_beads_per_um2(const Scene& scene);
 
-/// One gel stands for all: its answer falls with the modulus. @see Precision
+/// One gel represents all: its answer falls with the modulus. @see Precision
 struct Computed {
   KnownCell cell;
   BeadsOnGel densest;
