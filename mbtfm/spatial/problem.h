@@ -94,7 +94,7 @@ struct SpatialReconstruction;
 MatrixXd common_motions(const Observed& observed);
 
 /// The beads' rows with weights W S: over their standard errors (S) and by the roots of the loss's weights (W). The
-/// common motions are beside, and these columns.
+/// common motions and these columns are its blocks.
 inverse::Rows rows_of(const Problem& problem, const VectorXd& weights_by_row, const MatrixXd& columns = {});
 
 /// The motion that was found with the tractions, in the order of common_motions().

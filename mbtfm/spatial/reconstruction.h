@@ -110,7 +110,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
 /// the gel itself (Ambrosi, SIAM J. Appl. Math. 66 (2006) 2049, with tractions on a surface).
 SpatialReconstruction reconstruct_adjoint(const Problem& problem, const tractions::TractionParameters& traction,
                                           const SpatialParameters& parameters, int threads);
-/// The minimum of tikhonov's functional by Fletcher and Reeves, as the thesis. It reports its differences' cost.
+/// The minimum of tikhonov's functional by Fletcher and Reeves, as the thesis. It reports what differences would cost.
 SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tractions::TractionParameters& traction,
                                             const SpatialParameters& parameters, int threads);
 /// The displacement measured, interpolated from the nearest beads, is imposed on the surface (Hur et al., Cell. Mol.

@@ -15,7 +15,7 @@ namespace mbtfm::tractions {
 std::optional<double> noise_from_neighbours_um(const DisplacementField& beads);
 
 /// If not all beads state their errors, all get the one that their neighbours show.
-/// @returns it; none if they do, or if too few beads show it: then the misfit will
+/// @returns it; none if they do, or if there are too few beads: the misfit then shows it
 std::optional<double> assume_noise_um(DisplacementField& beads);
 
 }  // namespace mbtfm::tractions

@@ -165,7 +165,7 @@ const char* bright_colour_of(FibreType type) {
 const char* dashes_of(FibreType type) { return type == FibreType::edge ? ";stroke-dasharray:9 4 2 4" : ""; }
 
 std::string swatch_of(FibreType type, const std::string& colour) {
-  // edge fibres are dashed: eyes that see no colours know them, too
+  // edge fibres are dashed, to be recognised without colours, too
   return fmt::format("<span class=\"type\" style=\"background:{}\"></span>",
                      type == FibreType::edge
                          ? fmt::format("linear-gradient(90deg,{0} 40%,transparent 40% 60%,{0} 60%)", colour)

@@ -308,7 +308,7 @@ VectorXd newton_step(const Derivatives& d, const VectorXd& v, const VectorXd& lo
   return step;
 }
 
-/// Uphill, for where Newton's step misses: the residuals may be so small beside their errors that they show next to
+/// Uphill, for where Newton's step misses: the residuals may be so far below their errors that they show next to
 /// nothing of the curvature. About as long as the expected one wants it, which for n levels of variance w is n / 2 w².
 VectorXd uphill_step(const Design& design, const State& s, const Derivatives& d) {
   double error = 0;
