@@ -15,7 +15,7 @@ namespace mbtfm::spatial {
 
 namespace {
 
-/// By adhesion: the tractions at the vertices that stand for a force of one on it; in the answer of the beads it is the
+/// By adhesion: the tractions at the vertices that represent a force of one on it; in the answer of the beads it is the
 /// ellipse itself.
 MatrixXd shapes_of(const Problem& problem, const MatrixXd& areas_um2) {
   const Eigen::Map<const VectorXd> areas(problem.mesh.areas_um2.data(), problem.mesh.n_vertices());

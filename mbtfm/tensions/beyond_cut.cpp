@@ -187,7 +187,7 @@ bool is_nearer_to_neighbour(const Cell& cell, Vec2 place_um) {
 
 namespace {
 
-/// The motions by random forces Z that stand out of the noise, of unit variance.
+/// The motions by random forces Z that exceed the noise, of unit variance.
 MatrixXd motions_that_stand_out(const LinearData& data, const MatrixXd& Z, double kappa) {
   // What together exceeds the noise by a tenth of one component's changes no weight by a per cent.
   constexpr double kUnseen = 0.01;

@@ -41,7 +41,7 @@ bool is_nearer_to_neighbour(const Cell& cell, Vec2 place_um);
 /// What was allowed for.
 struct ForcesBeyond {
   Index n_places = 0, n_beneath_neighbours = 0;
-  Index n_motions = 0;  ///< of the beads, that stand out of their noise
+  Index n_motions = 0;  ///< of the beads, that exceed their noise
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
   double intensity_nN_per_um = 0;

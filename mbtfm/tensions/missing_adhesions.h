@@ -21,7 +21,7 @@ bool is_free(const Cell& cell, Vec2 place_um);
 /// the beads make likelier than not: one place in ten cells is expected, of a force as the adhesions have.
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads);
 
-/// None of the adhesions was seen: they stand for forces that nobody knows the places of.
+/// None of the adhesions was seen: they represent forces at unknown places.
 bool are_assumed(const std::vector<Adhesion>& adhesions);
 
 /// The adhesions' forces again, with these displacements of the beads, of any sizes; the tensions stay.

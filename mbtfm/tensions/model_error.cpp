@@ -208,7 +208,7 @@ VectorXd by_component(const VectorXd& by_adhesion, Index dimension) {
   return by_adhesion.transpose().replicate(dimension, 1).reshaped();
 }
 
-/// An adhesion that nothing pulls at by this model may still bear something.
+/// An adhesion that nothing pulls at by this model may still carry something.
 VectorXd not_without(const VectorXd& loads_nN) { return loads_nN.cwiseMax(1e-3 * loads_nN.mean()).cwiseMax(1e-300); }
 
 }  // namespace

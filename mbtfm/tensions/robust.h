@@ -23,7 +23,7 @@ struct Studentized {
 Studentized studentized(const LinearData& data, const Trial& trial, const MatrixXd& force_derivatives);
 
 /// Beads whose residuals Gaussian noise has in less than one case in twenty, exp(−r²/2) < 0.05 q (Rayleigh, r in robust
-/// standard deviations), and that stand alone: the nearest bead does not go along by half. The chance q that a bead is
+/// standard deviations), and that are alone: the nearest bead does not go along by half. The chance q that a bead is
 /// given adds up to 1: half goes to all alike, half by leverage, as a bead that the fit follows can do more harm
 /// (weighted Bonferroni: Genovese, Roeder & Wasserman, Biometrika 93:509, 2006). None where most of the large ones go
 /// along: then the model and not the beads are wrong there, and to discount them would explain the still part of the

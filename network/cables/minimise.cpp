@@ -8,7 +8,7 @@ namespace mbtfm::cables {
 namespace {
 
 // The path of a cold start. Lengths are rounded off over a fifth of an edge at first, the stretch by mu = a hundredth
-// of force times edge: a network at rest, all of whose cables stand at the kink, is smooth then. Each stage sharpens
+// of force times edge: a network at rest, all of whose cables are at the kink, is smooth then. Each stage sharpens
 // twofold, for on fine meshes wider strides leave too many cables on the wrong side of the kink; where one step did for
 // a stage the path is straight, and mu falls twentyfold. At the last mu so few cables are still undecided that the
 // exact energy settles them as fast: where some pull by far less than others, it must be small beside the least pull.

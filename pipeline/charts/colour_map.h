@@ -1,4 +1,4 @@
-/// Colours that stand for numbers: maps whose lightness rises all the way, so that colour-blind eyes and grey printers
+/// Colours that represent numbers: maps whose lightness rises all the way, so that colour-blind eyes and grey printers
 /// distinguish them.
 #pragma once
 

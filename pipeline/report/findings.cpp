@@ -235,7 +235,7 @@ std::string list_with(const std::vector<std::string>& facts, Items items, bool m
 enum class Judging { fit, traction };
 constexpr auto words(Judging) { return std::array{"fit", "traction"}; }
 
-/// Without one there is nothing that a tick could stand for.
+/// Without one there is nothing that a tick could mean.
 bool was_asked(const Provenance& provenance) {
   return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
     const auto state = named<StageState>(stage.state);

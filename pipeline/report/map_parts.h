@@ -1,4 +1,4 @@
-/// What the report's maps share: frames, colours that stand for numbers, fields of arrows.
+/// What the report's maps share: frames, colours that represent numbers, fields of arrows.
 #pragma once
 
 #include <string>

@@ -58,8 +58,8 @@ void complete_record(const std::filesystem::path& record_file, const StageRecord
 
 /// By stage, the tables of cell.toml that it depends on, as JSON with sorted keys.
 using Settings = std::map<std::string, std::string>;
-/// @param stages   of the cell; settings of their own stand in place of what cell.toml says
-/// @param beneath  values that stand in place of defaults
+/// @param stages   of the cell; settings of their own replace what cell.toml says
+/// @param beneath  values that replace defaults
 /// @throws InputError
 Settings read_settings(const std::filesystem::path& toml_file, const std::vector<Stage>& stages,
                        const std::vector<Setting>& beneath = {});
