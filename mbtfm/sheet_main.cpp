@@ -47,7 +47,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   report.summary = std::to_string(done.solution.elements->n_triangles()) + " triangles, mean tension " +
                    brief(balance.mean_tension_nN_per_um) + " nN/µm over " + brief(balance.area_um2) +
                    " µm², total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
-  if (!done.told.empty()) report.summary += "; " + done.told;
+  if (!done.fitted.empty()) report.summary += "; " + done.fitted;
   if (!region.cuts.empty() && !has_tractions)
     report.summary += "; WARNING: the image cuts the sheet, whose edge there counts as free";
   if (n_outside > 0) report.summary += "; " + counted(n_outside, "point lies", "points lie") + " outside of the sheet";

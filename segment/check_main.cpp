@@ -117,7 +117,7 @@ StageReport check(const fs::path& folder, const CheckParameters& p, int threads,
     seen[i] = look_at(found.cells[i], name_of(found.cells[i]));
     read_beads(found.cells[i], seen[i]);
   });
-  survey::tell_copies(seen);
+  survey::mark_same_pictures(seen);
   for (const runner::SkippedFolder& skipped : found.skipped) {
     seen.push_back({.error = skipped.why});
     seen.back().row.cell = name_of(skipped.folder);

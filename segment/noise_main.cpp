@@ -52,7 +52,7 @@ StageReport run(const NoiseParameters& given, stage::StageContext& context) {
   TrackParameters parameters = given.track;
   parameters.drift_affine = given.effects.drift_affine;
   parameters.effect_tolerance = given.effects.effect_tolerance;
-  parameters.may_push = true;  // nothing pulls, so nothing tells which picture is which
+  parameters.may_push = true;  // nothing pulls, so nothing shows which picture is which
   cv::setNumThreads(context.threads);
   const auto picture = [&](const char* name, const images::PlaneChoice& plane) {
     const std::filesystem::path file = context.input(name);

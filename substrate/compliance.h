@@ -81,7 +81,7 @@ struct Capabilities {
   bool space = false;                ///< forces into the gel, too, and points below its surface
   bool surface = false;              ///< the gel's surface may be curved
   bool large_strain = false;         ///< a Neo-Hookean gel
-  bool incompressible = false;       ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
+  bool incompressible = false;       ///< Poisson's ratio 0.5: no formula has the bulk modulus, infinite then
   bool linear = true;                ///< a response is a matrix
 };
 /// Neither sides nor a shape: what a force does depends on the distance alone.

@@ -1,4 +1,4 @@
-/// A model of the gel as a row of a table. Each stands in its own file (docs/extending.md).
+/// A model of the gel as a row of a table. Each is in its own file (docs/extending.md).
 #pragma once
 
 #include <memory>

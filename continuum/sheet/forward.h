@@ -16,7 +16,7 @@
 
 namespace mbtfm::sheet {
 
-/// What the sheet stands on.
+/// What the sheet lies on.
 enum class Ground {
   gel,      ///< bonded, or through the springs of its adhesions
   springs,  ///< each place by itself

@@ -108,7 +108,7 @@ Parts parts_of(const std::vector<GroundPatch>& tractions, const Elements& elemen
   return parts;
 }
 
-/// Takes off what nothing bears of net force and torque. @param hold  at cuts. @returns what was there
+/// Takes off the net force and torque that nothing carries. @param hold  at cuts. @returns what was there
 Unbalanced balance(Parts& parts, const CutHold& hold) {
   Vec2 centre, net;
   double area = 0, sum = 0;
@@ -128,7 +128,7 @@ Unbalanced balance(Parts& parts, const CutHold& hold) {
   }
   if (hold.holds[0]) net.x = 0;
   if (hold.holds[1]) net.y = 0;
-  if (hold.is_anywhere()) torque = 0;  // a line that may not move across bears a torque, too
+  if (hold.is_anywhere()) torque = 0;  // a line that may not move across carries a torque, too
   for (Part& part : parts.inside) {
     const Vec2 arm = part.shape.place_um - centre;
     part.force_nN = part.force_nN - part.area_um2 * (1 / area * net + torque / inertia * Vec2{-arm.y, arm.x});

@@ -56,7 +56,7 @@ enum class CutEdge {
 /// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
 /// does not depend on its modulus. A patch whose centre lies in the region acts as the square of its area; the
 /// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T),
-/// as far as no cut can bear them.
+/// as far as no cut can carry them.
 /// @param most_unbalanced  share of net force or torque. @throws InputError where more is out of balance
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
                            const TriangleSize& size, int threads, double most_unbalanced = kMostUnbalanced,

@@ -1,4 +1,4 @@
-/// A sheet at large strains: Green–Lagrange strain and St Venant–Kirchhoff's law, whatever it stands on.
+/// A sheet at large strains: Green–Lagrange strain and St Venant–Kirchhoff's law, whatever it lies on.
 #pragma once
 
 #include <functional>

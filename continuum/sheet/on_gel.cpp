@@ -127,7 +127,7 @@ VectorXd OnGel::spring_nN_per_um(const VectorXd& slip) const {
   return (kNeighbours * compliance_->diagonal_um_per_nN() + slip).cwiseInverse();
 }
 
-/// Springs that stand for the ground: by patch and component.
+/// Springs that represent the ground: by patch and component.
 void OnGel::add_springs(Stiffness& stiffness, const VectorXd& spring) const {
   for (std::size_t k = 0; k < patches_.triangles.size(); ++k) {
     Stiffness::OfElement K = Stiffness::OfElement::Zero();

@@ -19,7 +19,7 @@ namespace mbtfm::sheet {
 ///
 /// u eliminated, by conjugate gradients on balanced forces; the preconditioner is the same sheet on springs as stiff as
 /// the gel under each patch. C is the mean displacement of a patch (its centre's where the other is far) by forces
-/// spread over the ellipses that stand for the patches, made symmetric.
+/// spread over the ellipses that represent the patches, made symmetric.
 class OnGel {
  public:
   /// @param adhering  the triangles that are patches, rising

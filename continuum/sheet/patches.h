@@ -13,7 +13,7 @@
 
 namespace mbtfm::sheet {
 
-/// The ellipse that stands for a triangle of the mesh: of its area and centre.
+/// The ellipse that represents a triangle of the mesh: of its area and centre.
 substrate::Ellipse patch_of(const Elements& elements, int triangle);
 
 /// The ellipse of a triangle: of its centre, area and the ratio and direction of its axes of inertia.

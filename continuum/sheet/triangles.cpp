@@ -32,7 +32,7 @@ using FaceBase = CGAL::Delaunay_mesh_face_base_2<Kernel>;
 using Delaunay =
     CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>>;
 
-/// How large triangles may be: at the vertices of the curves as these are apart, growing from there. Vertices stand in
+/// How large triangles may be: at the vertices of the curves as these are apart, growing from there. Vertices are in
 /// blocks of neighbours, of which most are too far away to matter.
 class SizeField {
  public:

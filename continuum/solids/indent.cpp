@@ -189,7 +189,7 @@ Indentation solve_case(const Setting& setting, const Case& of, const Resolutions
   return result;
 }
 
-/// @throws InvalidData; what is not solved is told
+/// @throws InvalidData; what is not solved is reported
 Indentation tried_case(const Setting& setting, const Case& of, const Resolutions& at) {
   try {
     return solve_case(setting, of, at);

@@ -11,7 +11,7 @@
 namespace mbtfm::solids {
 namespace {
 
-/// Joins nodes that lie nearer to each other than rounding can tell.
+/// Joins nodes that lie nearer to each other than rounding can resolve.
 class NodesByPlace {
  public:
   NodesByPlace(double same_um, std::vector<Vec2>& positions) : same_um_(same_um), positions_(&positions) {}

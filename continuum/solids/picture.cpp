@@ -62,7 +62,7 @@ charts::Chart map_chart(const Setting& setting, const Depths& depths, const std:
                       {.label = "height of the cell (µm)", .low = heights.front(), .high = heights.back()}, rows);
   const double largest = largest_of(depths);
   chart.subtitle("0 (dark) to " + charts::readable(largest) + " µm (yellow)", "#444444");
-  constexpr int kStripes = 60;  // along a row: finer than the eye tells colours apart
+  constexpr int kStripes = 60;  // along a row: finer than the eye resolves colours
   row = 0;
   for (const auto& [ratio, by_height] : depths) {
     for (int k = 0; k < kStripes; ++k) {

@@ -31,7 +31,7 @@ std::optional<CrossValidation> cross_validation_of(const ReadyCell& ready, const
 }
 
 /// A fit of a sheet takes as long as that of the cell. It is worth it if fibres are in doubt: the network alone does as
-/// well by BIC, or bears more than half of the force.
+/// well by BIC, or carries more than half of the force.
 bool is_sheet_asked(Switch asked, const std::vector<ModelScore>& models, const EnsembleFit& fit) {
   if (asked != Switch::automatic) return asked == Switch::on;
   const auto bic_of = [&](const char* name) {
@@ -95,7 +95,7 @@ Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
 
 std::vector<std::string> names_of_groups(const EnsembleFit& fit) {
   std::vector<std::string> names;
-  for (const FibreGroup& group : fibres_not_told_apart(fit)) {
+  for (const FibreGroup& group : fibres_not_distinguished(fit)) {
     std::string& text = names.emplace_back();
     for (std::size_t k = 0; k < group.indices.size(); ++k)
       text += (k > 0 ? " + " : "") + std::to_string(fit.tensions.fibre_ids[group.indices[k]]);

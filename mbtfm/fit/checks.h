@@ -1,4 +1,4 @@
-/// What is asked of a fit beside its tensions: what the beads do besides, and whether the model is the right one.
+/// What is asked of a fit besides its tensions: what else the beads do, and whether the model is the right one.
 #pragma once
 
 #include <optional>
@@ -26,7 +26,7 @@ struct ModelChecks {
   std::vector<tensions::ModelScore> models;
   tensions::Influence influence;
   std::vector<tensions::FibreLeftOut> left_out;
-  std::vector<MissingFibre> missing_fibres;        ///< that the fit has beside those of the network
+  std::vector<MissingFibre> missing_fibres;        ///< that the fit has besides those of the network
   std::vector<MissingAdhesion> missing_adhesions;  ///< likewise
   std::optional<tensions::CrossValidation> drawn;
 };

@@ -1,5 +1,5 @@
 /// The effects of the fit as one table: how each is switched and decided, what a fit that had it would change, and how
-/// that is told. The parameters, the fit, `--explain` and the report walk it.
+/// that is reported. The parameters, the fit, `--explain` and the report walk it.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ struct EffectRow {
   EffectKind kind;
   std::string_view key;  ///< its switch in [effects]; empty: it has none
   Effect (*decided)(const FittedCell&);
-  /// Of the tensions, were it on. Null: it cannot change them, or nothing tells.
+  /// Of the tensions, were it on. Null: it cannot change them, or no datum shows it.
   std::optional<tensions::Change> (*change)(const FittedCell&, const Effect&, int threads) = nullptr;
   std::string_view without_change = "would change nothing that can be told: there is no datum of it";
 };

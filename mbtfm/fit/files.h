@@ -22,7 +22,7 @@ void write_results(stage::StageContext& context, const FittedCell& cell, const D
 /// allow it, fttc.json has the reason as its `obstacle`, and there is no fttc.csv.
 void write_usual_method(stage::StageContext& context, const Inputs& inputs, const Gel& gel);
 
-// What the fit tells of itself: into its record and the last line on the terminal.
+// What the fit reports of itself: into its record and the last line on the terminal.
 
 /// The gel's figures are those of its last call.
 StageReport report_of(const FittedCell& cell);

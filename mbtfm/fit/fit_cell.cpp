@@ -93,7 +93,7 @@ ReadyAndFitted on_cables(const Inputs& inputs, const Parameters& p, const Work& 
   return {std::move(ready), std::move(fit)};
 }
 
-/// The fit with all that the beads show beside the segmentation.
+/// The fit with all that the beads show besides the segmentation.
 struct Searched {
   ReadyCell ready;
   WithMissing with;

@@ -1,4 +1,4 @@
-/// The fit of a cell, from what was read to all that is told of it.
+/// The fit of a cell, from what was read to all that is reported of it.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-/// All that the fit of a cell can be told.
+/// All parameters of the fit of a cell.
 #pragma once
 
 #include "mbtfm/tensions/error_budget.h"

@@ -35,7 +35,7 @@ Unexplained unexplained_of(const LinearData& data, double noise_um) {
   const auto n_free = static_cast<double>(std::max<Index>(1, data.n_used - data.reduced.n_felt));
   const double left = data.reduced.floor_squared - variance * n_free;
   const double moved = all.squaredNorm() - variance * static_cast<double>(data.n_used);
-  // below its own scatter the difference from noise tells nothing
+  // below its own scatter the difference from noise shows nothing
   const double scatter = std::max(variance * std::sqrt(2 * n_free), 1e-300);
   return {data.reduced.floor_squared, std::max(left, scatter) / std::max(moved, scatter)};
 }
@@ -80,11 +80,11 @@ std::vector<Change> changes() {
           images("turned by 90 degrees to the left", kLeft),
           images("transposed (rows exchanged with columns)", kTransposed),
           images("transposed and turned by 180 degrees", kOther),
-          // forces may pull or push: which of the two has the wrong sign, they do not tell
+          // forces may pull or push: they do not show which of the two has the wrong sign
           table("uy (or ux) gets the other sign", kUpDown), table("ux and uy are exchanged", kTransposed)};
 }
 
-/// Each k-th, so that some hundred are left: enough to tell one reading from another.
+/// Each k-th, so that some hundred are left: enough to distinguish the readings.
 DisplacementField some_of(const DisplacementField& beads) {
   constexpr std::size_t kEnough = 400;
   const std::size_t step = 1 + beads.size() / kEnough;

@@ -111,7 +111,7 @@ EnsembleFit fit_on_strained_gel(const StrainedScene& scene, EnsembleFit fit, con
     work.tell(static_cast<double>(step) / kMostFits, "large strains of the gel");
     const substrate::Tangent tangent = gel.about(forces);
     const auto response = std::static_pointer_cast<const substrate::KeptResponse>(tangent.response);
-    // forces beside the network's stay linear: they are among the motions
+    // forces other than the network's stay linear: they are among the motions
     VectorXd offset = tangent.displacement_um - response->displace(forces);
     fit = refit(about_forces(std::move(fit.data), response, measured, std::move(offset)), next_start(fit));
     const VectorXd before = std::exchange(forces, adhesion_forces_nN(fit));

@@ -29,7 +29,7 @@ class GroupLasso {
   /// (AᵀA + rho)⁻¹ (Aᵀu + added)
   using Solve = std::function<Eigen::VectorXd(const Eigen::VectorXd& added, double rho)>;
   /// @param weights  w, by place
-  /// @param largest  about the largest |x_i|: tells the size of a good step, no more
+  /// @param largest  about the largest |x_i|: sets the size of a good step, no more
   GroupLasso(Solve solve, Eigen::Index n_unknowns, Eigen::ArrayXd weights, double largest, const Settled& settled)
       : solve_(std::move(solve)),
         weights_(std::move(weights)),

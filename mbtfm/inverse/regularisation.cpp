@@ -150,7 +150,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   for (double& e : scan.evidence) e -= highest;
   scan.by_evidence = lambda_at(scan.points, smallest_at(each(scan.evidence, [](double e) { return -e; })));
 
-  // With the errors that the data state, or with the misfit's where it tells of larger ones.
+  // With the errors that the data state, or with the misfit's if it shows larger ones.
   const double left = variance_left_at(scan.by_gcv);
   scan.variance = std::max(left, stated_variance.value_or(0));
   scan.variance_source = scan.variance > left ? "the errors that the data state" : "the misfit";

@@ -40,7 +40,7 @@ constexpr auto words(LambdaCriterion) { return std::array{"risk", "gcv", "l-curv
 
 /// Expected |t − true|² of each point, up to a constant. @param variance  of one datum
 using Risks = std::function<std::vector<double>(const std::vector<ScanPoint>&, double variance)>;
-/// (15) of one point. @param misfit, n_data  of the data that tractions can follow: the others tell the risk nothing
+/// (15) of one point. @param misfit, n_data  of the data that tractions can follow: the others do not enter the risk
 double unbiased_risk(const ScanPoint& point, double misfit, double n_data, double variance);
 /// (15), where tractions can follow all data.
 Risks unbiased_risks(double n_data);
@@ -48,7 +48,7 @@ Risks unbiased_risks(double n_data);
 /// @param points           at least 5, evenly spaced in log lambda, falling
 /// @param n_data           components of displacement
 /// @param stated_variance  of one datum in the same weights, where the data state their errors
-/// @param variance_left_at what the residual for one lambda tells of the same: robust_variance()
+/// @param variance_left_at what the residual for one lambda shows of the same: robust_variance()
 LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<double> stated_variance,
                  const std::function<double(double lambda)>& variance_left_at, const Risks& risks);
 

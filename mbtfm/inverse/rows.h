@@ -1,4 +1,4 @@
-/// Data by row, over their errors, and blocks of unknowns beside those that are asked for.
+/// Data by row, over their errors, and blocks of unknowns besides those that are asked for.
 #pragma once
 
 #include <optional>
@@ -25,7 +25,7 @@ WeightedBeads weighted(const DisplacementField& beads, double sum);
 /// turn, growth and two shears (relative).
 MatrixXd affine_motions(const DisplacementField& beads);
 
-/// P W: rows times their weights W, and with the columns C of blocks beside as further unknowns of any size: P = 1 −
+/// P W: rows times their weights W, and with the columns C of the blocks as further unknowns of any size: P = 1 −
 /// QQᵀ with Q an orthonormal basis of W C. What is fitted to such rows is what a fit with these blocks finds (Frisch &
 /// Waugh, Econometrica 1 (1933) 387).
 class Rows {

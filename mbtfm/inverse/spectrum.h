@@ -15,7 +15,7 @@ namespace mbtfm::inverse {
 /// Directions in which the risk looks for a signal.
 enum class SignalIn {
   felt,     ///< all that move the data: (15)
-  resolved  ///< those that the data tell from noise: (15b)
+  resolved  ///< those that the data distinguish from noise: (15b)
 };
 
 /// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu. Values of AᵀA below 1e-12 of the largest are rounding, and none here.
@@ -24,7 +24,7 @@ class Spectrum {
   /// @param normal   AᵀA; what is below its diagonal does not count
   /// @param adjoint  Aᵀu
   Spectrum(MatrixXd normal, const VectorXd& adjoint, double data_squared, double n_data);
-  /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise beside: criteria
+  /// Data whose squares, and those of Aᵀu by direction, are what they are in the mean with white noise added: criteria
   /// then are what they are expected to be. Of solve() nothing holds but the size.
   /// @param variance  of one datum
   Spectrum with_noise(double variance) const;
@@ -32,7 +32,7 @@ class Spectrum {
   /// @param stated_variance  of one datum
   LambdaScan scan(std::optional<double> stated_variance, SignalIn signal_in) const;
   /// Of one datum, of the half of the directions that is felt least, where it is larger than noise alone would have it
-  /// beside what no s can follow: there is an error of A itself then, which s can follow, and which no criterion with
+  /// besides what no s can follow: there is an error of A itself then, which s can follow, and which no criterion with
   /// white noise knows. None where they agree, or no data are left beside. Where a signal reaches so far down it is
   /// taken for such an error, and lambda is too large.
   std::optional<double> variance_felt_least() const;
@@ -64,7 +64,7 @@ class Spectrum {
                   std::optional<double> stated_variance, SignalIn signal_in) const;
   double misfit_in_frame(const Eigen::ArrayXd& shares) const;
   MatrixXd outer(const Eigen::ArrayXd& shares) const;
-  /// Directions that the data tell from noise. @param variance  of one datum
+  /// Directions that the data distinguish from noise. @param variance  of one datum
   Eigen::Array<bool, Eigen::Dynamic, 1> is_resolved(double variance) const;
   std::vector<double> risks_of_resolved(const std::vector<ScanPoint>& points, double variance) const;  ///< (15b)
   double data_squared_, n_data_;

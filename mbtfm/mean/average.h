@@ -30,7 +30,7 @@ class CellField {
   CellField(const std::vector<GroundPatch>& patches, const Motion& motion, const Extent& seen);
   /// None where the beads do not reach.
   std::optional<Sample> at(Vec2 place_um) const;
-  /// The mean over the motions of a symmetric shape: at each place of what stands at all its equivalents.
+  /// The mean over the motions of a symmetric shape: at each place of the values at all its equivalents.
   std::optional<Sample> at(Vec2 place_um, const std::vector<Motion>& motions) const;
 
  private:

@@ -80,7 +80,7 @@ Path outline_in(const Path& folder, const runner::ImageNames& names) {
   return {};
 }
 
-/// The image that cells are laid onto each other by: of this name, or what a key of [images] stands for.
+/// The image that cells are laid onto each other by: of this name, or the one that a key of [images] means.
 Path image_in(const Path& folder, const runner::ImageNames& names, const std::string& name_or_key) {
   return runner::is_image_key(name_or_key) ? resolve_image(folder, names, name_or_key) : folder / name_or_key;
 }

@@ -44,7 +44,7 @@ Mirrors mirrors_for(Switch setting, const Polygon& reference_um);
 void expect_symmetric(const Alignment& alignment, const std::string& symmetry);
 
 /// Each cell's best way onto the reference; those that do not fit are marked, with the reason.
-/// @param image  of the reference, to lay the cells' images onto; the outlines then tell how well they fit, and which
+/// @param image  of the reference, to lay the cells' images onto; the outlines then show how well they fit, and which
 /// cells have another shape
 std::vector<CellRow> aligned(const std::vector<Cell>& cells, const Alignment& alignment, int threads,
                              const Brightness* image = nullptr);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kImageAngles = 120;
 constexpr int kCoarse_px = 160;  // of the longer side while angles are tried: 3 degrees are then four pixels at the rim
-constexpr int kFine_px = 800;    // of the longer side at last: more tells the place no better than the outline is drawn
+constexpr int kFine_px = 800;    // of the longer side at last: more fixes the place no better than the outline is drawn
 constexpr int kWays = 4;         // that are refined
 
 struct Raster {

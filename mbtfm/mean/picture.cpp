@@ -39,7 +39,7 @@ charts::Chart traction_chart(const Scene& scene) {
     chart.bar(node.position_um - half, node.position_um + half, "fill:" + colour + ";stroke:" + colour);
   }
   chart.curve(closed(scene.reference_um), "stroke:#ffffff;stroke-width:1.2;fill:none");
-  constexpr double kArrows = 18;  // along the longer side: so many can be told apart
+  constexpr double kArrows = 18;  // along the longer side: so many can be distinguished
   constexpr double kLongest_px = 20;
   const double width = std::max(frame.x.high - frame.x.low, std::abs(frame.y.high - frame.y.low));
   const int every = std::max(1, static_cast<int>(std::lround(width / scene.spacing_um / kArrows)));

@@ -75,7 +75,7 @@ Normal normal_of(const std::vector<Pair>& pairs, Vec2 centre, double size) {
     normal.matrix += by * by.transpose();
     normal.slope += distance * by;
   }
-  // a circle does not tell its angle: leave it
+  // a circle does not show its angle: leave it
   constexpr double kHold = 1e-9;
   const double weight = kHold * static_cast<double>(pairs.size());
   normal.matrix += Eigen::Vector3d(weight, weight, weight * size * size).asDiagonal();

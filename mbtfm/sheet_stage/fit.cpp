@@ -22,7 +22,7 @@
 namespace mbtfm::sheet_stage {
 namespace {
 
-/// Beads without flags, and with an error each where any neighbours tell it.
+/// Beads without flags, and with an error each if any neighbours show it.
 DisplacementField read_beads(stage::StageContext& context) {
   DisplacementField beads = files::read_displacement(context.input("displacement"));
   std::erase_if(beads, [](const Bead& bead) { return !bead.flag.empty(); });
@@ -185,17 +185,17 @@ sheets::Question question_of(const Parameters& p, stage::StageContext& context, 
 }
 
 /// "contraction 1.8 nN/µm (1.7 to 1.9); …"
-std::string told_by(const sheets::SheetFit& fit) {
-  std::string told;
+std::string fitted_numbers(const sheets::SheetFit& fit) {
+  std::string fitted;
   std::vector<double> bundles_nN;
   for (const SheetEstimate& e : fit.estimates)
     if (e.quantity == sheets::Quantity::bundle_tension)
       bundles_nN.push_back(e.value);
     else
-      told += (told.empty() ? "" : "; ") + sentence_of(e);
-  if (bundles_nN.empty()) return told;
+      fitted += (fitted.empty() ? "" : "; ") + sentence_of(e);
+  if (bundles_nN.empty()) return fitted;
   const auto [least, most] = std::ranges::minmax(bundles_nN);  // sheet_fit.csv has each
-  return told +
+  return fitted +
          (bundles_nN.size() == 1 ? "; tension of a bundle " + brief(least)
                                  : "; tensions of " + counted(std::ssize(bundles_nN), "bundles") + " " + brief(least) +
                                        " to " + brief(most)) +
@@ -203,10 +203,10 @@ std::string told_by(const sheets::SheetFit& fit) {
 }
 
 /// What a reader must know of the fit.
-void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, const std::string& told) {
+void notice_fit(stage::StageContext& context, const sheets::BeadFit& found, const std::string& fitted) {
   const sheets::SheetFit& fit = found.fit;
   const auto stiffness = std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &SheetEstimate::quantity);
-  context.notice(noticed(Symptom::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, {.at = told}));
+  context.notice(noticed(Symptom::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, {.at = fitted}));
   notice_unexplained(context, fit, found.misfit);
   if (!found.field) notice_expansion(context, fit, found.n_parts);
   context.notice(
@@ -249,16 +249,16 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
     write_contractions(context.output("out", "contraction.csv"), at_nodes);
     notice_expansion(context, at_nodes);
   }
-  result.told = told_by(fit);
+  result.fitted = fitted_numbers(fit);
   result.tables = report::tables_of_sheet(estimates_file, models_file);
   result.varied = found.varied;
-  notice_fit(context, found, result.told);
+  notice_fit(context, found, result.fitted);
   result.figures = {{"ground", std::string(name_of(Ground::gel))},
                     {"strain", std::string(name_of(Strain::small))},
                     {"stiffness_nN_per_um", fit.stiffnesses.sheet_nN_per_um},
                     {"contraction_nN_per_um", scene.contraction.nN_per_um},
                     {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
-                    {"fitted", result.told},
+                    {"fitted", result.fitted},
                     {"correlation", fit.correlation},
                     {"relative_l2", fit.relative_l2},
                     {"expected_relative_l2", fit.expected_relative_l2.value_or(fit.relative_l2)},

@@ -30,8 +30,8 @@ Region area_around(const Region& region, stage::StageContext& context, const Par
 }
 
 /// What the edge along the cuts makes of the tensions: with that held, clamped or free.
-Figures tell_cut(stage::StageContext& context, const Region& area, const Polygon& outline, const Solution& held,
-                 const CutPull& cut, const std::function<FromTraction(CutEdge)>& with) {
+Figures report_cut(stage::StageContext& context, const Region& area, const Polygon& outline, const Solution& held,
+                   const CutPull& cut, const std::function<FromTraction(CutEdge)>& with) {
   constexpr double kSame = 0.05;  // of the mean tension
   const FromTraction clamped = with(CutEdge::clamped), free = with(CutEdge::free);
   const double mean = figures_inside(held, outline).mean_nN_per_um,
@@ -94,7 +94,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
     const auto with = [&](CutEdge edge) {
       return tensions_from(tractions, area, material, size, context.threads, 1, {}, edge);
     };
-    std::ranges::copy(tell_cut(context, area, outline, result.solution, *found.cut, with),
+    std::ranges::copy(report_cut(context, area, outline, result.solution, *found.cut, with),
                       std::back_inserter(result.figures));
   }
   const double mean = found.balance.mean_tension_nN_per_um;

@@ -70,7 +70,7 @@ void write_page(stage::StageContext& context, const Run& done, const Balance& ba
   report::StagePage page{
       .title = "Contracting sheet", .facts = {}, .findings = context.findings_, .tables = {}, .figures = done.figures};
   constexpr double kRounding = 1e-6;
-  if (!done.told.empty()) page.facts.push_back("Fitted to the beads: " + done.told + ".");
+  if (!done.fitted.empty()) page.facts.push_back("Fitted to the beads: " + done.fitted + ".");
   if (!done.varied.empty()) page.facts.push_back(done.varied);
   page.facts.push_back("The mean tension is " + charts::readable(balance.mean_tension_nN_per_um) + " nN/µm over " +
                        charts::readable(balance.area_um2) + " µm²; the forces on the ground add up to " +

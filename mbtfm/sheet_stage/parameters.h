@@ -27,9 +27,9 @@ struct Parameters {
   double most_unbalanced = kMostUnbalanced;
   std::optional<double> traction_sigma_kPa, traction_correlation_um;
   Parts fit_parts = Parts::none;                  ///< the simplest
-  int field_points = 40;                          ///< of a colony's beads tell fewer numbers
+  int field_points = 40;                          ///< a colony's beads determine fewer numbers
   bool fit_line_tension = false;                  ///< most colonies have none
-  bool fit_adhesion_stiffness = false;            ///< few beads tell it beside the sheet's own
+  bool fit_adhesion_stiffness = false;            ///< few beads distinguish it from the sheet's own
   std::optional<double> outline_error_um;         ///< unset: by its source
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
 };

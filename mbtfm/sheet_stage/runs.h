@@ -17,7 +17,7 @@ struct Run {
   Figures figures;
   std::vector<Effect> effects;
   std::optional<Balance> balance = {};       ///< with what holds the sheet at cuts; unset: by the solution alone
-  std::string told = {};                     ///< for the last line
+  std::string fitted = {};                   ///< for the last line
   std::string varied = {};                   ///< what a varying contraction changes
   std::vector<report::Listing> tables = {};  ///< of the page
 };

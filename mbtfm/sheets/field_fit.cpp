@@ -65,7 +65,7 @@ class FieldSearch {
     for (const double smoothing : smoothings_) precisions_.push_back(prior.precision(smoothing));
   }
 
-  /// Over stiffnesses that are closer than the beads tell them.
+  /// Over stiffnesses that are closer than the beads resolve.
   Posterior posterior() {
     constexpr double kFine = 1.0;  // steps that are a standard deviation at least
     constexpr double kReach = 6;   // standard deviations, or steps, to both sides

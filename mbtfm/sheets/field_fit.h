@@ -44,13 +44,13 @@ struct FieldFit {
   MatrixXd covariance;               ///< of c
   double smoothing = 0;              ///< λ (um²/nN²)
   bool is_smoothing_at_end = false;  ///< as smooth as was tried: the beads call for no variation
-  double degrees = 0;                ///< how many numbers of the contraction the beads tell
+  double degrees = 0;                ///< how many numbers of the contraction the beads determine
 };
 
 /// Bayes' rule, with a prior that knows how smooth a contraction is and nothing of its mean: exp(−λ/2 ∫ |∇s|² dA). For
 /// each stiffness and λ the contraction is linear in the data; means, errors and 95 % intervals are over the posterior
 /// of all three, log M and log λ equally probable before (MacKay, Neural Comput. 4 (1992) 415). Whatever λ is, the
-/// contraction may vary by the patterns of variation.h: the beads hardly tell these from another stiffness.
+/// contraction may vary by the patterns of variation.h: the beads hardly distinguish these from another stiffness.
 ///
 ///   log p(y | M, λ) = ½ log |P| − ½ log |N/v + P| − Q/(2v),   Q = min |A c − y|² + v cᵀPc,   N = AᵀA
 ///

@@ -205,11 +205,11 @@ Linearised linearised(const LinearData& data, const Directions& about, double va
     return padded(numerics::inverse_symmetric(of.normal(data) + of_prior(of.unknown, of.unknown)), of);
   };
   const MatrixXd inverse = solved(about);
-  // a stiffness that the beads do not tell within a factor of e follows no straight line
-  Directions told = about;
+  // a stiffness that the beads do not determine within a factor of e follows no straight line
+  Directions resolved = about;
   const Index n_loads = about.forces.cols() - 2;
-  std::erase_if(told.unknown, [&](Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
-  const MatrixXd forces = numerics::small_product(about.forces, solved(told));
+  std::erase_if(resolved.unknown, [&](Index k) { return k >= n_loads && variance * inverse(k, k) > 1; });
+  const MatrixXd forces = numerics::small_product(about.forces, solved(resolved));
   return {.covariance = variance * inverse,
           .without_motion = variance * padded(numerics::inverse_symmetric(about.normal_without_motion(data) +
                                                                           of_prior(about.unknown, about.unknown)),

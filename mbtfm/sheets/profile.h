@@ -94,7 +94,7 @@ Directions directions_about(const StiffnessTable& table, const Stiffnesses& at, 
 struct Linearised {
   MatrixXd covariance;      ///< of the loads, log M and log κ; 0 of what is known
   MatrixXd without_motion;  ///< the same if the beads shared no motion
-  MatrixXd answers;         ///< SheetFit::answers: of a stiffness that is not told none
+  MatrixXd answers;         ///< SheetFit::answers: none of a stiffness that is not resolved
 };
 /// What these amplitudes leave of the beads, and how the fit follows their noise.
 /// @param prior  beside the normal equations, by the first of the columns; empty: none
@@ -115,7 +115,7 @@ FittedEstimate fitted_estimate(SheetEstimate estimate, double variance, VectorXd
 tensions::LinearData weighed(tensions::LinearData data, tensions::Loss loss,
                              const std::function<VectorXd(const tensions::LinearData&)>& amplitudes);
 
-/// The solution as displacements: node_amplitudes, and how they fit. @param n_unknowns  numbers that the beads told
+/// The solution as displacements: node_amplitudes, and how they fit. @param n_unknowns  numbers that the beads fixed
 void add_misfit(SheetFit& fit, const tensions::LinearData& data, VectorXd node_amplitudes, double n_unknowns);
 
 /// Models of the same beads, in units of the noise. The first is nothing.

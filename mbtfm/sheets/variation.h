@@ -11,14 +11,14 @@
 
 namespace mbtfm::sheets {
 
-/// By so much of itself the contraction of a sheet may vary over it. Beads do not tell it: a sheet that pulls more at
+/// By so much of itself the contraction of a sheet may vary over it. Beads do not show it: a sheet that pulls more at
 /// its edge moves its gel as an even, softer one.
 inline constexpr double kVariation = 0.2;
 
 /// The smoothest patterns g: polynomials of second degree, orthogonal to each other and to 1. Two slopes, two saddles,
 /// and the edge against the middle. Each has the root mean square kVariation/√3, with which the last is
 /// kVariation (2 r²/R² − 1) on a disc.
-/// @param weights  of the places: what area each stands for
+/// @param weights  of the places: the area that each represents
 /// @return places × 5
 MatrixXd smooth_patterns(const std::vector<Vec2>& places_um, const VectorXd& weights);
 

@@ -76,18 +76,18 @@ Foreseen Foresight::at(double noise) const {
   const double variance = std::max(scan.variance, least), lambda2 = chosen.lambda * chosen.lambda;
   const ArrayXd& values = spectrum_->values();
   const ArrayXd of_background = 1 / (values + lambda2);
-  const numerics::SmallCholesky told(
+  const numerics::SmallCholesky information(
       numerics::minus_product(patches_, hidden_.transpose() * of_background.matrix().asDiagonal(), hidden_));
   const MatrixXd heard = numerics::minus_product(
       patches_, hidden_.transpose() * (2 * of_background - values * of_background.square()).matrix().asDiagonal(),
       hidden_);
-  const MatrixXd inverse = told.inverse();
+  const MatrixXd inverse = information.inverse();
   Foreseen f{.lambda = chosen.lambda / noise,
              .degrees = noisy.degrees(chosen.lambda),
              .covariance_nN2 = variance * inverse,
              .by_noise_nN2 = numerics::small_product(numerics::small_product(stated, inverse, heard), inverse),
-             .mean_nN = told.solve(pulled_by_patches_ -
-                                   numerics::transposed_matvec(hidden_, (of_background * pulled_.array()).matrix())),
+             .mean_nN = information.solve(
+                 pulled_by_patches_ - numerics::transposed_matvec(hidden_, (of_background * pulled_.array()).matrix())),
              .net_force_nN2 = {},
              .net_by_noise_nN2 = {},
              .resolution_um = {}};

@@ -1,4 +1,4 @@
-/// What beads will tell of tractions in space, before their noise is known.
+/// What beads will determine of tractions in space, before their noise is known.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,9 +12,9 @@ namespace mbtfm::spatial {
 /// What a reconstruction of beads with this noise states in the mean.
 struct Foreseen {
   double lambda = 0;   ///< of the problem's own errors
-  double degrees = 0;  ///< how many numbers the beads tell
+  double degrees = 0;  ///< how many numbers the beads determine
   /// Of the forces on adhesions, x, y, z of each in turn: as forces_beside_background() states it, and its part by the
-  /// noise of the beads. The rest is the background that they do not tell from the forces.
+  /// noise of the beads. The rest is the background that they do not separate from the forces.
   MatrixXd covariance_nN2, by_noise_nN2;
   VectorXd mean_nN;                                 ///< those forces, in the mean
   Eigen::Matrix3d net_force_nN2, net_by_noise_nN2;  ///< the same of the sum over the surface

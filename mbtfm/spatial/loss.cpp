@@ -73,7 +73,7 @@ Prediction predicted(const MatrixXd& offsets, const MatrixXd& over_sigma, const 
         inverse::weights_of(inverse::Loss::tukey, residuals.reshaped(), std::max(made.scatter, 1e-300), n_components)
             .cwiseMax(1e-9);
     normal = linear.transpose() * weights.asDiagonal() * linear;
-    normal.diagonal().array() += 1e-9 * normal(0, 0);  // beads in a plane tell nothing across it
+    normal.diagonal().array() += 1e-9 * normal(0, 0);  // beads in a plane show nothing across it
     const MatrixXd field = numerics::solve_symmetric(normal, linear.transpose() * weights.asDiagonal() * over_sigma);
     residuals = (over_sigma - linear * field).transpose();
     made.distance = (own - field.row(0)).norm();
@@ -142,9 +142,9 @@ Judged judged(const AmongNeighbours& among, double n, double in_box, double degr
   Judged found{std::vector<double>(among.distance.size(), 1), 0};
   constexpr int kMost = 200;
   constexpr double kSettled = 1e-6;
-  double astray = 0.1, before = 0;
-  for (int step = 0; step < kMost && std::abs(astray - before) > kSettled; ++step) {
-    before = std::exchange(astray, 0);
+  double outlier_share = 0.1, before = 0;
+  for (int step = 0; step < kMost && std::abs(outlier_share - before) > kSettled; ++step) {
+    before = std::exchange(outlier_share, 0);
     found.log_likelihood = 0;
     for (std::size_t b = 0; b < found.good.size(); ++b) {
       const double as_good = (1 - before) * student_density(among.distance[b], n, degrees);
@@ -152,7 +152,7 @@ Judged judged(const AmongNeighbours& among, double n, double in_box, double degr
       const double both = std::max(as_good + as_astray, 1e-300);
       found.good[b] = as_good / both;
       found.log_likelihood += std::log(both);
-      astray += (1 - found.good[b]) / static_cast<double>(found.good.size());
+      outlier_share += (1 - found.good[b]) / static_cast<double>(found.good.size());
     }
   }
   return found;

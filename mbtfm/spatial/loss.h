@@ -1,6 +1,6 @@
 /// What the misfit of a bead costs: sum of rho(|r_b|) with r_b = S (u − G t), S = 1/sigma by direction, so that beads
-/// that are wrong cannot pull the tractions away and no axis of the plane is special. Which beads in space are astray,
-/// by the beads around them. docs/theory/tractions-in-space.md (26).
+/// that are wrong cannot pull the tractions away and no axis of the plane is special. Which beads in space are
+/// outliers, by the beads around them. docs/theory/tractions-in-space.md (26).
 #pragma once
 
 #include <vector>
@@ -31,7 +31,7 @@ Weighing weigh(BeadLoss loss, const Observed& observed, const VectorXd& residual
 /// u − u_n by bead. u_n is the displacement at the bead's place of the linear field that the 16 nearest beads follow
 /// (biweight, Maronna, Martin & Yohai, Robust Statistics, 2006, 5.4; as the normalised median test of Westerweel &
 /// Scarano, Exp. Fluids 39 (2005) 1096). Beads that are far off are no neighbours in a second and a third round. No
-/// traction is assumed: what a reconstruction smooths away does not look astray here.
+/// traction is assumed: what a reconstruction smooths away is no outlier here.
 struct AmongNeighbours {
   std::vector<double> distance;  ///< over the errors of both
   /// Of both, over the beads' sigma: what the neighbours scatter about the field, at least one (where no sigma is

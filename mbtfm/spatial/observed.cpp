@@ -33,7 +33,7 @@ numerics::Near near_beads(const Observed& observed) {
 Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Ground& ground,
                  const SpatialParameters& parameters) {
   check(beads);
-  constexpr double kFewest = 4;       // a force, a couple and a noise are more than three vectors tell
+  constexpr double kFewest = 4;       // a force, a couple and a noise are more than three vectors determine
   constexpr double kErrorsAbove = 3;  // of its height a bead may lie above the surface
   constexpr double kRounding_um = 0.02;
   Observed observed;

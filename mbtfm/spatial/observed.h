@@ -1,4 +1,4 @@
-/// What beads in space tell of a gel, their displacements as rows, each with its error; and where tractions are
+/// What beads in space show of a gel, their displacements as rows, each with its error; and where tractions are
 /// expected.
 #pragma once
 

@@ -39,8 +39,8 @@ constexpr auto words(Refine) { return std::array{"none", "region", "resolved", "
 constexpr bool starts_coarse(Refine refine) { return refine == Refine::resolved || refine == Refine::threshold; }
 
 struct SpatialParameters {
-  /// Of the lattice of tractions, over the distance of the beads: beads that are closer tell no finer tractions apart;
-  /// at their distance the lattice itself would be felt.
+  /// Of the lattice of tractions, over the distance of the beads: the beads resolve no finer tractions; at
+  /// their distance the lattice itself would be felt.
   double spacing_beads = 0.83;
   Region region = Region::automatic;
   Refine refine = Refine::none;  ///< errors of all methods were measured so

@@ -15,7 +15,7 @@ namespace mbtfm::spatial {
 
 namespace {
 
-/// By adhesion: the tractions at the vertices that stand for a force of one on it; in the answer of the beads it is the
+/// By adhesion: the tractions at the vertices that represent a force of one on it; in the answer of the beads it is the
 /// ellipse itself.
 MatrixXd shapes_of(const Problem& problem, const MatrixXd& areas_um2) {
   const Eigen::Map<const VectorXd> areas(problem.mesh.areas_um2.data(), problem.mesh.n_vertices());
@@ -36,14 +36,14 @@ Anywhere tractions_anywhere(const Problem& problem, int threads) {
   return {std::move(basis), std::move(response)};
 }
 
-/// How far what the patches leave looks like tractions beside them, as a standard normal deviate. With y the rows
+/// How far what the patches leave looks like tractions besides them, as a standard normal deviate. With y the rows
 /// less their best forces on the patches, A the response to tractions of variance one anywhere and M the projection off
 /// the patches' response, y'A A'y is the score of these tractions' variance at zero. Over y'y per datum, if patches are
 /// all there is, it has the first two moments of a scaled chi-squared of h = (tr K)²/tr K² with K = A'M A, which the
 /// cube root makes normal (Wilson & Hilferty, PNAS 17 (1931) 684). Taken off before is what a field of the size of the
 /// gel's model error adds on the average, if tractions of variance one made it: that error is no noise.
 /// Source: Lin, Biometrika 84 (1997) 309.
-/// @param beside  the rows, with the patches as a block beside  @param degrees  of freedom that y has
+/// @param beside  the rows, with the patches as a block besides  @param degrees  of freedom that y has
 double deviate_of_tractions_beside(const Problem& problem, const inverse::Rows& beside, const MatrixXd& anywhere,
                                    const VectorXd& weights_by_row, double degrees, int threads) {
   const VectorXd u = rows_of(problem, weights_by_row).of(problem.displacement_um());
@@ -89,8 +89,8 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   }
   tractions::TractionParameters penalised = traction;
   if (!has_background && !traction.lambda_um_per_kPa) {
-    // Few numbers that the beads tell well: least squares. Criteria of lambda take the half of them that is felt least
-    // for noise, with whatever pulls there.
+    // Few numbers that the beads determine well: least squares. Criteria of lambda take the half of them that is felt
+    // least for noise, with whatever pulls there.
     constexpr double kNone = 1e-6;
     const VectorXd even = VectorXd::Ones(response.rows());
     const auto spectrum = spectrum_of(problem, response, even, static_cast<double>(response.rows()), threads);

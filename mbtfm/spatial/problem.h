@@ -34,7 +34,7 @@ struct Problem {
   MatrixXd patch_response_um_per_nN = {};   ///< to forces spread evenly over them, x, y, z of each in turn
   MatrixXd adhesion_areas_um2 = {};         ///< adhesions × vertices: the area of each, as weights of the vertices
   MatrixXd facet_response_um_per_kPa = {};  ///< to even tractions on the faces, where they are asked for
-  MatrixXd common_um = {};                  ///< what all beads may do together beside; no columns: nothing
+  MatrixXd common_um = {};                  ///< what all beads may do together besides; no columns: nothing
   double model_error = 0;                   ///< relative, of G, as the gel's model states it
   Figures figures = {};                     ///< of that model
 
@@ -90,14 +90,14 @@ struct SpatialReconstruction;
 
 /// Shift along each axis that the beads have (um) and turn about z (rad), of unit size, as rows of `observed`. A stage
 /// that moved between two stacks and a dish that was put back do this to all beads, and where a cell fills the view
-/// their tracker cannot tell it from what the cell does.
+/// their tracker cannot distinguish it from what the cell does.
 MatrixXd common_motions(const Observed& observed);
 
 /// The beads' rows with weights W S: over their standard errors (S) and by the roots of the loss's weights (W). The
-/// common motions are beside, and these columns.
+/// common motions and these columns are its blocks.
 inverse::Rows rows_of(const Problem& problem, const VectorXd& weights_by_row, const MatrixXd& columns = {});
 
-/// The motion that was found beside tractions, in the order of common_motions().
+/// The motion that was found with the tractions, in the order of common_motions().
 struct CommonMotionInSpace {
   VectorXd values, sigma;
 };

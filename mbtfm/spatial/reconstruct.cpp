@@ -72,8 +72,8 @@ void find_doubts(const Problem& problem, const SpatialParameters& parameters, Sp
   const bool has_few_unknowns = r.method == TractionMethod::patches && parameters.background == 0;  // by choice
   if (r.degrees > 0 && !has_few_unknowns) {
     constexpr double kEnough = 24;  // as the table of findings has it
-    // Ten times the noise tells 4.5 times fewer numbers, and noise falls as the root of the number of beads: they grow
-    // about as its cube root. Measured (notes/tractions_in_space.md).
+    // With ten times the noise beads determine 4.5 times fewer numbers, and noise falls as the root of the number of
+    // beads: they grow about as its cube root. Measured (notes/tractions_in_space.md).
     const double ratio = kEnough / r.degrees;
     r.findings.push_back(
         noticed(Symptom::beads_tell_little, ratio,
@@ -246,7 +246,7 @@ Settled<Solver> settled(const Problem& problem, const Basis& basis, const tracti
   const Observed& observed = problem.observed;
   const std::vector<double> good = probabilities_of_good(loss, observed);
   const bool is_large = problem.map != nullptr;
-  // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
+  // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: far outliers
   // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.
   const auto fit = [&](Weighing weighing, const std::optional<Weighing>& judged = {}) {
     Fit<Solver> made;

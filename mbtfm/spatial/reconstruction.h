@@ -26,7 +26,7 @@ struct Summands {
 struct SpatialReconstruction {
   tractions::TractionMethod method{};
   VectorXd traction_kPa;  ///< three a vertex
-  /// Of tractions: by the noise, and by what is not resolved. Empty: the method tells none.
+  /// Of tractions: by the noise, and by what is not resolved. Empty: the method states none.
   MatrixXd covariance_kPa2;
   std::optional<Summands> summands;  ///< unset: the map's
   VectorXd resolved;                 ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
@@ -34,7 +34,7 @@ struct SpatialReconstruction {
   std::optional<double> lambda;                       ///< of |S (u − G t)|² + lambda² |s|²
   std::optional<double> length_um;                    ///< lambda times E, the same for every method
   std::optional<inverse::LambdaCriterion> lambda_by;  ///< what chose lambda in the end; none: it was given
-  double degrees = 0;                                 ///< how many numbers the beads tell
+  double degrees = 0;                                 ///< how many numbers the beads determine
   double relative_l2 = 0;                             ///< |S (u − G t)| / |S u|, weighed by the loss
   double noise_um = 0;                                ///< along the surface, as the beads have it
   double chi_squared = 0;  ///< misfit over what the stated errors leave, per datum; 0: not stated
@@ -67,7 +67,7 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
 SpatialReconstruction reconstruct_patches(const Problem& problem, const tractions::TractionParameters& traction,
                                           const SpatialParameters& parameters, int threads);
 
-/// lambda of |S (u − G t)|² + lambda² ∫ |t|² dA per um/kPa: as flat methods have it, the sum over beads stands for an
+/// lambda of |S (u − G t)|² + lambda² ∫ |t|² dA per um/kPa: as flat methods have it, the sum over beads approximates an
 /// integral over the surface, and their weights have a mean of one.
 double lambda_per_um_per_kPa(const Problem& problem);
 
@@ -90,7 +90,7 @@ enum class RiskCriterion {
   use_gcv
 };
 /// The one that is given, or by the criterion. Where the risk's is below half of the evidence's, the evidence's:
-/// tractions then follow beads that are astray, or what the model has wrong, and the risk has no minimum but the end of
+/// tractions then follow outliers, or what the model has wrong, and the risk has no minimum but the end of
 /// the scan. The finding says so.
 ChosenLambda choose_lambda(const Problem& problem, const inverse::LambdaScan& scan,
                            const tractions::TractionParameters& traction, RiskCriterion risk_criterion);
@@ -110,7 +110,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
 /// the gel itself (Ambrosi, SIAM J. Appl. Math. 66 (2006) 2049, with tractions on a surface).
 SpatialReconstruction reconstruct_adjoint(const Problem& problem, const tractions::TractionParameters& traction,
                                           const SpatialParameters& parameters, int threads);
-/// The minimum of tikhonov's functional by Fletcher and Reeves, as the thesis: what its differences would cost is told.
+/// The minimum of tikhonov's functional by Fletcher and Reeves, as the thesis. It reports what differences would cost.
 SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tractions::TractionParameters& traction,
                                             const SpatialParameters& parameters, int threads);
 /// The displacement measured, interpolated from the nearest beads, is imposed on the surface (Hur et al., Cell. Mol.
@@ -120,7 +120,7 @@ SpatialReconstruction reconstruct_direct(const Problem& problem, int threads);
 SpatialReconstruction reconstruct_green(const Problem& problem, const tractions::TractionParameters& traction,
                                         const SpatialParameters& parameters, int threads);
 
-/// Forces on the adhesions beside a background that is only known to be weak: what the beads say of an even load on
+/// Forces on the adhesions with a background that is only known to be weak: what the beads say of an even load on
 /// each, least squares with the background's displacement as a part of the noise. Smoothing takes nothing from them,
 /// and their errors hold noise and background. Where the surface carries more than these adhesions do, it is in the
 /// errors only as far as it is as weak as lambda says.
@@ -171,7 +171,7 @@ Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstr
 std::optional<Finding> noticed_imbalance(const Balance& balance);
 
 /// Forces closer together than this look like one; from about twice that on they are mostly seen as two
-/// (notes/planning.md). The side of the area over which the beads tell one number for
+/// (notes/planning.md). The side of the area over which the beads determine one number for
 /// each component.
 std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& reconstruction);
 

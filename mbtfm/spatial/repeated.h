@@ -32,7 +32,7 @@ double mean_traction_kPa(const Problem& problem, const VectorXd& traction_kPa);
 /// the displacement. @throws UsageError as choice::decide
 Effect decide_strain(const Problem& problem, const VectorXd& traction_kPa, const substrate::SubstrateParameters& gel);
 
-/// Gauss and Newton: the gel's tangent about the tractions found, and the tractions anew, until they stay.
+/// Gauss and Newton: the gel's tangent about the tractions found, and the tractions again, until they stay.
 /// @param at_rest   the problem of small strains
 /// @param found     its tractions
 /// @param again     finds those of another problem

@@ -69,17 +69,17 @@ std::string summary_line(const SpatialReconstruction& r, const Balance& balance)
 
 std::string left_out_of(const Observed& observed) {
   std::string text;
-  const auto tell = [&](int n, const char* what) {
+  const auto add = [&](int n, const char* what) {
     if (n > 0) text += "; " + std::to_string(n) + what;
   };
-  tell(observed.n_flagged, " flagged beads left out");
-  tell(observed.n_above, " beads above the surface left out");
-  tell(observed.n_below_base, " beads below the base left out");
-  tell(observed.n_beyond, " beads left out where no surface is known");
+  add(observed.n_flagged, " flagged beads left out");
+  add(observed.n_above, " beads above the surface left out");
+  add(observed.n_below_base, " beads below the base left out");
+  add(observed.n_beyond, " beads left out where no surface is known");
   return text;
 }
 
-/// What does not go together is told with the names of the files.
+/// What does not go together is reported with the names of the files.
 Problem problem_of(const StageParameters& p, const SpatialInputs& inputs, const Meshing& meshing,
                    const substrate::SubstrateParameters& gel, const stage::StageContext& context) {
   try {

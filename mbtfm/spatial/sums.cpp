@@ -104,11 +104,11 @@ std::vector<PartForce> forces_beside_background(const Problem& problem, const Ma
   const Eigen::LLT<MatrixXd, Eigen::Upper> factor(inner);
   const MatrixXd AP = numerics::small_transposed_product(A, P);
   const MatrixXd hidden = factor.solve(AP);
-  const numerics::SmallCholesky told(
+  const numerics::SmallCholesky information(
       numerics::minus_product(numerics::small_transposed_product(P, P), AP.transpose(), hidden));
-  const VectorXd forces_nN = told.solve(numerics::transposed_matvec(P, u) -
-                                        numerics::transposed_matvec(hidden, numerics::transposed_matvec(A, u)));
-  const MatrixXd covariance_nN2 = r.variance * told.inverse();
+  const VectorXd forces_nN = information.solve(numerics::transposed_matvec(P, u) -
+                                               numerics::transposed_matvec(hidden, numerics::transposed_matvec(A, u)));
+  const MatrixXd covariance_nN2 = r.variance * information.inverse();
   std::vector<PartForce> parts = parts_of(problem, problem.adhesion_areas_um2);
   for (std::size_t a = 0; a < parts.size(); ++a) {
     const auto at = 3 * static_cast<Index>(a);

@@ -122,7 +122,7 @@ Basis orthonormal_basis(Eigen::MatrixXd norm_um2);
 /// @param width_um  standard deviation
 Basis spot_basis(const TractionMesh& mesh, const Ground& ground, double width_um);
 
-/// The width of spots that beads at this distance tell apart.
+/// The width of spots that beads at this distance resolve.
 double spot_width_um(double bead_distance_um);
 
 }  // namespace mbtfm::spatial

@@ -87,8 +87,8 @@ class Tiling {
   std::vector<Square> squares_;
 };
 
-/// Of a component of the adhesions' forces, as forces independent of each other have it: less their noise, and each by
-/// what the beads tell of it. @param variance  of the beads' weighted components
+/// Of a component of the adhesions' forces, as forces independent of each other have it: less their noise, each
+/// weighted by the beads' information on it. @param variance  of the beads' weighted components
 double mean_square_force(const LinearData& data, double variance) {
   const Index n = data.response->cols();
   const VectorXd noise = variance * solve_normal(data.reduced, MatrixXd::Identity(n, n)).diagonal();
@@ -187,9 +187,9 @@ bool is_nearer_to_neighbour(const Cell& cell, Vec2 place_um) {
 
 namespace {
 
-/// The motions by random forces Z that stand out of the noise, of unit variance.
+/// The motions by random forces Z that exceed the noise, of unit variance.
 MatrixXd motions_that_stand_out(const LinearData& data, const MatrixXd& Z, double kappa) {
-  // What together stands out by a tenth of the noise of one component changes no weight by a per cent.
+  // What together exceeds the noise by a tenth of one component's changes no weight by a per cent.
   constexpr double kUnseen = 0.01;
   const MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
   const auto [values, vectors] = numerics::symmetric_eigen(square);
@@ -244,7 +244,7 @@ double expected_own(double distance_um) {
 
 DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
   auto& [data, found] = given;
-  constexpr double kLeast = 0.02;  // nothing beside the errors that forces have in whole cells, too (0.1)
+  constexpr double kLeast = 0.02;  // negligible beside the errors that forces have in whole cells, too (0.1)
   std::vector<Index> near;
   std::vector<double> expected;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {

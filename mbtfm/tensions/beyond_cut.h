@@ -1,6 +1,6 @@
 /// Forces of others: beyond the cut of a cell that its image cuts, and beneath other cells in the image. Their
 /// displacement reaches this cell's beads. It is allowed for as motions of the beads: responses of the gel to forces at
-/// these places, which are not found one by one but expected to be of one size, which the beads tell.
+/// these places, which are not found one by one but expected to be of one size, which the beads determine.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,17 +35,17 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
 /// @param beads_um  that are used, none of them beside a neighbour
 std::vector<substrate::Ellipse> places_beneath_neighbours(const Cell& cell, const std::vector<Vec2>& beads_um,
                                                           const BeyondSpacing& spacing);
-/// Whether a bead tells of a neighbour's forces more than of this cell's: it is no witness of rest, either.
+/// Whether a bead measures a neighbour's forces more than this cell's: it is no witness of rest, either.
 bool is_nearer_to_neighbour(const Cell& cell, Vec2 place_um);
 
 /// What was allowed for.
 struct ForcesBeyond {
   Index n_places = 0, n_beneath_neighbours = 0;
-  Index n_motions = 0;  ///< of the beads, that stand out of their noise
+  Index n_motions = 0;  ///< of the beads, that exceed their noise
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
   double intensity_nN_per_um = 0;
-  /// Adhesions so near to the cut that they may have forces beside the network's, and the standard deviation of a
+  /// Adhesions so near to the cut that they may have forces besides the network's, and the standard deviation of a
   /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
   Index n_own = 0;
   double own_nN = 0;
@@ -56,10 +56,10 @@ struct DataWithBeyond {
   LinearData data;
   ForcesBeyond beyond;
 };
-/// The data with these motions beside those that they have. The forces are taken for random, independent of each other
+/// The data with these motions besides those that they have. The forces are taken for random, independent of each other
 /// and of one intensity: the one that makes the data most likely, whatever the forces inside of the image are
 /// (restricted maximum likelihood; Patterson & Thompson, Biometrika 58 (1971) 545), but no less than that of the forces
-/// in view. An even traction of any size is allowed for beside them. What lies out there pulls the image's border
+/// in view. An even traction of any size is allowed for besides them. What lies out there pulls the image's border
 /// outwards or inwards as a growth would: growth and shears are from here on expected to be of usual size
 /// (kUsualGrowth).
 /// @param data  whose motions are affine_motions(), of precision 0, or none
@@ -69,10 +69,10 @@ struct DataWithBeyond {
 /// @param area_um2  of the part of the cell that is in view
 DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places, Index n_beyond,
                                   const MatrixXd& compliance_um_per_nN, double area_um2);
-/// Adhesions near the cut may have forces of their own, beside the network's: a fibre of which less than 3 um is in
+/// Adhesions near the cut may have forces of their own, besides the network's: a fibre of which less than 3 um is in
 /// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
 /// is, while the cell's own gave way, which fades over 10 um. They pass through the cut. Expected is a part of the size
-/// that adhesion forces of this cell have, as forces independent of each other tell it.
+/// that adhesion forces of this cell have, as forces independent of each other show it.
 /// @param cell  whose adhesions are those of the data
 DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell);
 /// Both, for the places of this cell, on a layer of this gel (of gels with sides or a graded modulus it differs by

@@ -1,6 +1,6 @@
-/// Motion that all beads share beside the displacement by forces: shift, turn, growth and shear of one picture against
-/// the other, as after a change of focus or of temperature. It is found beside the forces by least squares, so that
-/// none of it is taken for force, whatever its size, and what the beads cannot tell from it is in the error bars.
+/// Motion that all beads share besides the displacement by forces: shift, turn, growth and shear of one picture against
+/// the other, as after a change of focus or of temperature. It is found with the forces by least squares, so that
+/// none of it is taken for force, whatever its size, and what the beads cannot separate from it is in the error bars.
 #pragma once
 
 #include <Eigen/Core>

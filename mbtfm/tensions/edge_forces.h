@@ -26,8 +26,8 @@ struct EdgeForces {
 EdgeForces edge_forces(const EnsembleFit& fit, const Cell& cell, const Gel& gel);
 
 /// Total and network's force with these, if they are there, and with the error by what is not known of them: whether
-/// they are, and half of their sum, as the adhesions bear a part of it and forces of one place cancel. The adhesions'
-/// forces are found beside them; the tensions stay.
+/// they are, and half of their sum, as the adhesions carry a part of it and forces of one place cancel. The adhesions'
+/// forces are found with them; the tensions stay.
 /// @param n_last  motions of the data that stay the last ones
 EnsembleFit with_edge_forces(EnsembleFit fit, EdgeForces found, const Cell& cell, const Gel& gel, Eigen::Index n_last);
 

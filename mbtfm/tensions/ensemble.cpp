@@ -103,7 +103,7 @@ struct Quantities {
 
 /// Their means over the meshes, and errors.
 /// @param of_mesh  quantities of a mesh
-/// @param along  each by force (forces × quantities): its own error is the model's, beside that of the tensions; empty
+/// @param along  each by force (forces × quantities): its own error is the model's, in addition to the tensions'; empty
 ///               for tensions
 /// @param is_single  each quantity is of one adhesion
 /// @param more_noise  further variances by the beads' noise; empty: none
@@ -310,7 +310,7 @@ void add_estimates(EnsembleFit& all, bool is_cut) {
   add_force_estimates(all, is_cut);
 }
 
-/// R + E a + E' a', the latter beside what the former make of the network's.
+/// R + E a + E' a', the latter besides what the former make of the network's.
 OwnForces one_after_the_other(const OwnForces& first, const OwnForces& then) {
   return {.left = numerics::small_product(then.left, first.left),
           .found_nN = numerics::plus_matvec(then.found_nN, then.left, first.found_nN),
@@ -369,11 +369,11 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
   return forces;
 }
 
-/// The beads' own variance, or the misfit's where the data are too few to tell it or the loss is a robust one.
+/// The beads' own variance, or the misfit's if the data are too few to determine it or the loss is a robust one.
 double variance_beside_model_error(const LinearData& data, const VectorXd& forces_nN, Index n_tensions, Loss loss) {
   constexpr Index kEnough = 50;  // known to 20 %
-  const bool is_told = data.n_used - data.reduced.n_felt >= kEnough;
-  return loss == Loss::squares && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
+  const bool is_known = data.n_used - data.reduced.n_felt >= kEnough;
+  return loss == Loss::squares && is_known ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
 }
 
 }  // namespace
@@ -462,8 +462,8 @@ std::vector<MeshFit> fit_meshes(const network::Ensemble& networks, const Reduced
   return meshes;
 }
 
-/// Of the beads on which the tensions rest, those beside adhesions: they may scatter more than the others.
-void add_telling(EnsembleFit& all) {
+/// Of the beads that determine the tensions, those near adhesions: they may scatter more than the others.
+void add_leverage_weighted(EnsembleFit& all) {
   const MeshFit& mesh = all.meshes.front();
   const VectorXd leverage = studentized(all.data, mesh.fit.trial, mesh.force_derivatives).leverage;
   const VectorXd residual = weighted_residual(all.data, adhesion_forces_nN(all));
@@ -471,13 +471,13 @@ void add_telling(EnsembleFit& all) {
   const Eigen::Map<const MatrixXd> by_bead(residual.data(), each, leverage.size());
   const double squares = by_bead.colwise().squaredNorm().dot(leverage);
   const double sum = std::max(leverage.sum(), 1e-300);
-  all.misfit.telling_variance = squares / (static_cast<double>(each) * sum);
-  all.misfit.telling_error = leverage.norm() / sum;
+  all.misfit.leverage_weighted_variance = squares / (static_cast<double>(each) * sum);
+  all.misfit.leverage_weighted_error = leverage.norm() / sum;
   if (all.misfit.loss == Loss::squares)  // others weigh such beads down
-    all.misfit.variance = std::max(all.misfit.variance, all.misfit.telling_variance);
+    all.misfit.variance = std::max(all.misfit.variance, all.misfit.leverage_weighted_variance);
 }
 
-/// What adhesions exert beside the network, near a cut and where the network is wrong.
+/// What adhesions exert in addition to the network, near a cut and where the network is wrong.
 /// @param is_whole  all that the cell pulls at is among them: they balance
 Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_whole) {
   Discrepancy beside = discrepancy_of(all.data.reduced, mean_of(forces_at_mean(all)), sum_over_meshes_nN(all), error,
@@ -487,7 +487,7 @@ Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_w
   return beside;
 }
 
-/// Of the beads, and of the model where two meshes or more tell it.
+/// Of the beads, and of the model if two meshes or more determine it.
 void add_variances(EnsembleFit& all, bool is_cut) {
   const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   all.misfit.chi_squared_per_degree = weighted_residual(all.data, all.forces.nN).squaredNorm() /
@@ -498,7 +498,7 @@ void add_variances(EnsembleFit& all, bool is_cut) {
   all.model_error = model_error(meshes, all.data.reduced,
                                 variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss));
   all.misfit.variance = all.model_error->noise_variance;
-  if (!all.model_error->is_told) return;
+  if (!all.model_error->is_known) return;
   const Discrepancy beside = add_discrepancy(all, *all.model_error, !is_cut);
   all.model_error = with_discrepancy(std::move(*all.model_error), beside);
 }
@@ -538,7 +538,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   add_means(all);
   all.forces.own = own_forces_in(all.data);
   add_variances(all, networks.front().is_cut());
-  add_telling(all);
+  add_leverage_weighted(all);
   numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[m], all); });
   all.tensions.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);
@@ -549,7 +549,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
 
 EnsembleFit with_forces_by(EnsembleFit all, LinearData data) {
   all.data = std::move(data);
-  if (!all.model_error || !all.model_error->is_told) return all;
+  if (!all.model_error || !all.model_error->is_known) return all;
   const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   const double variance = variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss);
   add_discrepancy(all, model_error(forces_at_mean(all), all.data.reduced, variance), false);

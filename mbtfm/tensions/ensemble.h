@@ -64,11 +64,11 @@ struct FoundTensions {
 /// What the adhesions carry, fx and fy by adhesion; means over the meshes.
 struct FoundForces {
   VectorXd nN;                       ///< of the network
-  std::optional<OwnForces> own;      ///< that adhesions have beside these, near a cut and where the network is wrong
+  std::optional<OwnForces> own;      ///< that adhesions have in addition, near a cut and where the network is wrong
   VectorXd torques_nN_um;            ///< by adhesion, about the origin
   std::vector<Estimate> magnitudes;  ///< by adhesion
   VectorXd of_network_nN;            ///< with every fibre at the network's tension: the network's part
-  EdgeForces edge;                   ///< beside those of the adhesions
+  EdgeForces edge;                   ///< in addition to those of the adhesions
   double away_nN2 = 0;               ///< variance of the total by forces away from all adhesions that it holds
 };
 
@@ -76,9 +76,9 @@ struct FoundForces {
 struct Unexplained {
   double chi_squared_per_degree = 0;  ///< 1 where the model explains all but the noise
   double variance = 0;                ///< of a component of the data: see misfit_variance
-  /// The same of what the adhesions' forces leave, each bead counted as it tells the tensions (its leverage), and its
+  /// The same of what the adhesions' forces leave, each bead weighted by its leverage on the tensions, and its
   /// error by chance, relative: the tensions' errors follow it (White, Econometrica 48 (1980) 817).
-  double telling_variance = 0, telling_error = 0;
+  double leverage_weighted_variance = 0, leverage_weighted_error = 0;
   Loss loss = Loss::squares;  ///< that the first fit called for
 };
 
@@ -90,7 +90,7 @@ struct EnsembleFit {
   Estimate total_force_nN, network_force_nN;
   Unexplained misfit;
   LinearData data;                        ///< as the loss weighs it
-  std::optional<ModelError> model_error;  ///< that two meshes or more tell
+  std::optional<ModelError> model_error;  ///< determined by two meshes or more
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is
 };

@@ -20,7 +20,7 @@ namespace {
 
 using substrate::Ellipse;
 
-/// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.
+/// Sums of forces that have a budget of their own besides the tensions, by force: the total; through the cut, if any.
 MatrixXd sums_of(const EnsembleFit& fit) {
   MatrixXd sums = directions_of(adhesion_forces_nN(fit));
   if (!fit.cut) return sums;
@@ -52,7 +52,7 @@ Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
 
 VectorXd variances(const MatrixXd& gain, const VectorXd& variance) { return gain.cwiseAbs2() * variance; }
 
-/// The parts that each mesh tells, in squares, mean over the meshes.
+/// The parts that each mesh shows, in squares, mean over the meshes.
 struct MeanVariances {
   VectorXd beads, mesh, model, solver, place;
 };
@@ -86,7 +86,7 @@ MatrixXd pulled_place(const BudgetInputs& in) {
       numerics::small_product(numerics::small_product(in.data.motions.shapes, columns), numerics::inverse(upper)));
 }
 
-/// What the beads would tell more of the tensions if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.
+/// By how much the tensions' covariance would fall if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.
 MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const MatrixXd& pulled) {
   const MatrixXd answered = numerics::small_product(
       mesh.noise_covariance_nN2, numerics::small_transposed_product(mesh.force_derivatives, pulled));  // Cov V
@@ -271,7 +271,7 @@ VectorXd values_of_rows(const EnsembleFit& fit) {
 }
 
 /// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
-/// Which of the two it is no model tells: both are counted.
+/// No model shows which of the two it is: both are counted.
 VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
   const VectorXd values = values_of_rows(in.fit);
   VectorXd variance = (in.substrate_error * values).cwiseAbs2();

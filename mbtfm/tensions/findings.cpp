@@ -138,14 +138,14 @@ Noticed beads_disagree(const FitOutcome& o) {
                   .severity = beneath_named(Symptom::beads_disagree_by_region, beside)});
 }
 
-/// Of the beads on which the tensions rest.
+/// Of the beads that determine the tensions.
 Noticed telling_beads_scatter(const FitOutcome& o) {
   const double stated = stated_noise_um(o.data);
   if (stated <= 0 || o.summary.noise_um <= 0) return {};
   const Unexplained& left = o.fit.misfit;
-  const double ratio = left.telling_variance / std::pow(o.summary.noise_um / stated, 2);
+  const double ratio = left.leverage_weighted_variance / std::pow(o.summary.noise_um / stated, 2);
   constexpr double kErrors = 3;  // of the ratio by chance
-  return noticed(Symptom::telling_beads_scatter, ratio - kErrors * left.telling_error,
+  return noticed(Symptom::telling_beads_scatter, ratio - kErrors * left.leverage_weighted_error,
                  {.value = brief(std::sqrt(ratio))});
 }
 
@@ -164,7 +164,7 @@ Noticed explains_little(const FitOutcome& o) {
   const double noise = o.summary.expected_relative_l2 * o.summary.expected_relative_l2;  // of the beads' own squares
   if (noise <= 0 || noise >= 1) return {};
   const double share = unexplained_share(o.summary);
-  // of the noise's squares, which far beads tell, and of what is left
+  // of the noise's squares, which far beads determine, and of what is left
   const double sigma = 2 * noise / (1 - noise) / std::sqrt(static_cast<double>(std::max<Index>(1, o.data.n_used)));
   return noticed(Symptom::explains_little, share - 3 * sigma, {.value = brief(100 * (1 - share))});
 }

@@ -29,7 +29,7 @@ struct FitOutcome {
   const std::optional<FoundPlacement>& place;
   const std::optional<ForcesBeyond>& beyond;  ///< none: not allowed for
   const Effect& strain;                       ///< large ones of the gel
-  bool has_far_beads;                         ///< they tell the noise by themselves
+  bool has_far_beads;                         ///< they determine the noise by themselves
 };
 
 /// In the order in which a user should read them.

@@ -1,4 +1,4 @@
-/// What the fit tells its user, from what the ensemble of meshes found.
+/// What the fit reports to its user, from what the ensemble of meshes found.
 #pragma once
 
 #include <string>
@@ -61,7 +61,7 @@ Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& 
 
 // The noise of the bead displacements, from beads far from the cell (thesis 3.3).
 
-/// At least 30 of those in use lie that far outside the outline: 60 components tell a standard deviation to about 10 %.
+/// At least 30 of those in use lie that far outside the outline: 60 components give a standard deviation to about 10 %.
 bool has_far_beads(const LinearData& data, const Polygon& outline_um, double far_distance_um);
 
 struct NoiseLevel {

@@ -22,7 +22,7 @@ std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
   return indices;
 }
 
-// Of a tension in one step. A cable without tension hangs loose, and its derivative then tells nothing of a taut one:
+// Of a tension in one step. A cable without tension hangs loose, and its derivative then does not predict a taut one:
 // who lets a fibre go slack on the word of a far-off derivative may never see it pull again.
 constexpr double kLargestDrop = 0.7;
 // Of the largest tension: below this a fibre may go to zero.
@@ -40,7 +40,7 @@ constexpr double kExplained = 1e-3;
 // A refused step is damped by no less: at a smaller part of the diagonal the next one would be the same again.
 constexpr double kFirstRefusal = 0.3;
 
-/// What no bead could tell, in Phi; nor exact beads, as forces are known to some 1e-10.
+/// What no bead could resolve, in Phi; nor exact beads, as forces are known to some 1e-10.
 double negligible(const TensionProblem& problem, double objective, Search search = Search::best) {
   constexpr double kRounding = 1e-20;
   const double part = (search == Search::best ? kNegligible : kNegligibleAtFirst) * problem.n_tensions();
@@ -160,8 +160,8 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Sea
     if (fit.report.last_change < parameters.tolerance && damping <= 1e-2)
       return has_ended("the tensions change by less than the tolerance");
     // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
-    const double told = negligible(problem, fit.trial.objective, search);
-    if ((predicted < told && damping <= 1e-2) || (gain > 0 && gained_of_late(fit) < told))
+    const double resolved = negligible(problem, fit.trial.objective, search);
+    if ((predicted < resolved && damping <= 1e-2) || (gain > 0 && gained_of_late(fit) < resolved))
       return has_ended("the last steps lower the misfit by less than any bead could tell");
     if (gain > 0) {
       MatrixXd after = problem.jacobian(fit.trial);

@@ -155,7 +155,7 @@ VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, c
     const VectorXd deviation = std::sqrt(std::max(0.0, eigen.values[k])) * eigen.vectors.col(k);
     const double size = deviation.cwiseAbs().maxCoeff();
     if (size == 0) return;                              // held
-    const double part = std::min(1.0, largest / size);  // what no bead tells of deviates without bounds
+    const double part = std::min(1.0, largest / size);  // what no bead constrains deviates without bounds
     for (const double step : {part, -part}) {
       const VectorXd there = (solution.tensions_nN + step * deviation).cwiseMax(0.0);
       const VectorXd straight = numerics::plus_matvec(solution.residual, jacobian, there - solution.tensions_nN);

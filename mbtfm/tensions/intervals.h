@@ -1,4 +1,4 @@
-/// How far the tensions may lie from the best ones, as the beads tell on one mesh.
+/// How far the tensions may lie from the best ones, as the beads show on one mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,14 +17,14 @@ struct LocalMisfit {
   VectorXd tensions_nN;
   MatrixXd H;                    ///< Jᵀ J
   VectorXd g;                    ///< Jᵀ r
-  MatrixXd model_variance = {};  ///< of g by the error of the model, beside that of the noise; empty: none
+  MatrixXd model_variance = {};  ///< of g by the error of the model, besides that of the noise; empty: none
 };
 LocalMisfit local_misfit(const Trial& trial, const MatrixXd& jacobian);
 
 /// K = H⁻¹: how the tensions follow −g. Those that the data press against zero by three standard errors or more are
 /// held: they do not move, and the others as without them; by one or less they are free. Between, they pass from the
-/// one to the other smoothly, so that nothing jumps where the data change by rounding. A direction of which no bead
-/// tells anything moves far.
+/// one to the other smoothly, so that nothing jumps where the data change by rounding. A direction that no bead
+/// constrains moves far.
 MatrixXd response_of(const LocalMisfit& local, double variance);
 
 /// K Var(g) K: of both errors (the sandwich; White, Econometrica 50 (1982) 1).
@@ -60,7 +60,7 @@ struct Sides {
 /// Infinite above where no bead feels a tension.
 std::vector<Sides> profiles_95(const LocalMisfit& local, double variance);
 
-/// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance drawn anew, less
+/// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance redrawn, less
 /// the solution. One column a draw; the draws' random numbers follow from their index.
 /// @param force_variance_nN2  of the model's error, drawn too; empty: none
 MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters, const Trial& solution,

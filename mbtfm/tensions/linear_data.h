@@ -23,7 +23,7 @@ struct ReducedData {
   std::shared_ptr<const MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
   VectorXd target;                             ///< y: 2·adhesions
   double floor_squared = 0;                    ///< what no force can explain
-  Index n_components = 0;                      ///< of the beads' displacements that it stands for
+  Index n_components = 0;                      ///< of the beads' displacements that it represents
   Index n_felt = 0;                            ///< directions of the forces that any bead feels
   bool is_upper = false;                       ///< C is an upper triangle
   Index dimension = 2;                         ///< components of a force
@@ -36,13 +36,13 @@ struct Motions {
   MatrixXd shapes = {};     ///< M: 2·beads × motions
   VectorXd precision = {};  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
                             ///< units of the noise's; 0 where nothing is known of it; empty: all 0
-  MatrixXd inverse = {};  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The covariance
+  MatrixXd inverse = {};  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place show a turn as a shift. The covariance
                           ///< of the sizes by noise of variance 1
-  MatrixXd forces = {};  ///< E: by motion, the forces of adhesions that it comes of, beside those found as forces;
-                         ///< 2·adhesions × motions; empty: none
+  MatrixXd forces = {};   ///< E: by motion, the forces of adhesions that it comes of, besides those found as forces;
+                          ///< 2·adhesions × motions; empty: none
 };
 
-/// These beside those: each stays what it is.
+/// These besides those: each stays what it is.
 Motions joined(Motions those, const Motions& these);
 /// The same, ahead of the last of those.
 Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);
@@ -58,7 +58,7 @@ struct LinearData {
   VectorXd bead_weight;      ///< by bead, 0 … 1: what a robust loss leaves of W²
   Motions motions;
   Index n_used = 0;         ///< components of the beads that are used, less one for each motion of precision 0
-  bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit gives the error
   int threads = 1;          ///< to reduce it with
   Index dimension = 2;      ///< components of a force, and of a bead's displacement
   ReducedData reduced;      ///< of all that, bead_weight included
@@ -96,7 +96,7 @@ VectorXd moved_by(const LinearData& data, const VectorXd& forces_nN);
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
 /// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
 MatrixXd motion_in(const LinearData& data, const MatrixXd& displacements);
-/// Forces that adhesions have of their own, E a beside R: the a that explain best what R leaves. Linear in R, so
+/// Forces that adhesions have of their own, E a besides R: the a that explain best what R leaves. Linear in R, so
 /// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
 struct OwnForces {
   MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G: 2·adhesions square

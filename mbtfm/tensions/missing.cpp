@@ -10,7 +10,7 @@ namespace mbtfm::tensions {
 
 namespace {
 
-/// The segmented fibre whose ends lie beside these two adhesions: the beads then tell where it ends and of no other.
+/// The segmented fibre whose ends lie near these two adhesions: the beads then show where it ends, and no other fibre.
 std::optional<int> fibre_beside(const MissingFibre& missing, const Cell& cell) {
   constexpr double kNear_um = 2;  // of an adhesion's rim
   const auto adhesion = [&](int id) { return *std::ranges::find(cell.adhesions, id, &Adhesion::adhesion_id); };

@@ -1,5 +1,5 @@
 /// Fibres and adhesions that the beads show and the segmentation misses. The kind that explains most is the cause: it
-/// becomes part of the fit, as the others would get its force, and both are asked again beside it.
+/// becomes part of the fit, as the others would get its force, and both are asked again with it.
 #pragma once
 
 #include <vector>
@@ -32,7 +32,7 @@ struct CellSearched {
   int threads = 1;
 };
 
-/// A fibre's tension is fitted again beside one that is missing. An adhesion's is not: a fibre whose adhesion was not
+/// A fibre's tension is fitted again with one that is missing. An adhesion's is not: a fibre whose adhesion was not
 /// found ends in the network, which no force at that place puts right (held_at()). The adhesions' forces are found
 /// beside both.
 WithMissing with_missing(EnsembleFit fit, const CellSearched& on);

@@ -145,8 +145,8 @@ std::vector<Vec2> free_places(const Cell& cell) {
   return places;
 }
 
-/// Places where what is left of the beads looks most like a force, as the beads around alone have it: beside all that
-/// the adhesions exert, as these explain much of a force nearby, and beside the network's forces.
+/// Places where what is left of the beads looks most like a force, as the beads around alone have it: besides all that
+/// the adhesions exert, as these explain much of a force nearby, and besides the network's forces.
 std::vector<Vec2> likely_places(const EnsembleFit& fit, const std::vector<Vec2>& places, const Gel& gel, int threads) {
   constexpr double kLeast = 10;      // of the gain: chance has it at each hundred and fiftieth place
   constexpr std::size_t kMost = 25;  // of either: where so many fail, the model is wrong as a whole

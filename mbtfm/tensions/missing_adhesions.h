@@ -16,21 +16,21 @@ struct MotionsBeside;
 /// Whether it lies in the cell, and an adhesion there is none of those that were found.
 bool is_free(const Cell& cell, Vec2 place_um);
 
-/// The best ones, each beside those before: places one micrometre apart, of a force spread over a disc of 0.5 um. They
+/// The best ones, each with those before: places one micrometre apart, of a force spread over a disc of 0.5 um. They
 /// are looked for in what the forces leave of the beads around, and asked by all beads (search.h). Kept are those that
 /// the beads make likelier than not: one place in ten cells is expected, of a force as the adhesions have.
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cell& cell, const Gel& gel, int threads);
 
-/// None of the adhesions was seen: they stand for forces that nobody knows the places of.
+/// None of the adhesions was seen: they represent forces at unknown places.
 bool are_assumed(const std::vector<Adhesion>& adhesions);
 
-/// The adhesions' forces again, beside these displacements of the beads, of any sizes; the tensions stay.
+/// The adhesions' forces again, with these displacements of the beads, of any sizes; the tensions stay.
 /// @param shapes  2·beads × some
 /// @param n_last  motions of the data that stay the last ones
 /// @returns the sizes
 MotionsBeside find_forces_beside(EnsembleFit& fit, MatrixXd shapes, Index n_last);
 
-/// The fit of a cell that pulls at these places, too: the adhesions' forces beside theirs, and the total with them.
+/// The fit of a cell that pulls at these places, too: the adhesions' forces with theirs, and the total with them.
 /// @param places  their forces and gains become what the fit finds
 /// @param n_last  motions of the data that stay the last ones
 EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& places, const Gel& gel, Index n_last);

@@ -35,7 +35,7 @@ std::size_t place_of(int adhesion_id, const std::vector<Adhesion>& adhesions) {
   return static_cast<std::size_t>(at - adhesions.begin());
 }
 
-constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
+constexpr double kTradeOff = -0.95;  // see fibres_not_distinguished
 
 /// Forces of the one tension of all cables that fits best: Gauss–Newton in one variable. Zero where the beads want the
 /// cables to push: less tension is better then down to none, as forces are proportional to a small one.
@@ -66,7 +66,7 @@ MatrixXd correlation_of(const EnsembleFit& fit) {
   return numerics::scaled_on_both_sides(fit.tensions.covariance_nN2, scale);
 }
 
-std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
+std::vector<FibreGroup> fibres_not_distinguished(const EnsembleFit& fit) {
   const MatrixXd correlation = correlation_of(fit);
   const int n = static_cast<int>(correlation.rows());
   std::vector<bool> is_placed(static_cast<std::size_t>(n), false);
@@ -199,7 +199,7 @@ VectorXd segmentation_variance_nN2(const VectorXd& forces_nN, const std::vector<
 
 namespace {
 
-/// Fibres from adhesion to adhesion, all found together: what the beads tell of each beside the others.
+/// Fibres from adhesion to adhesion, all found together: what the beads show of each, given the others.
 class FibresTogether {
  public:
   using Pair = std::array<std::size_t, 2>;  ///< of adhesions, by their place in the list
@@ -208,13 +208,13 @@ class FibresTogether {
   FibresTogether(std::vector<Vec2> places_um, MatrixXd K, VectorXd q)
       : places_um_(std::move(places_um)), K_(std::move(K)), q_(std::move(q)) {}
 
-  struct Told {
+  struct FittedPairs {
     std::vector<Pair> pairs;        ///< those that pull
     VectorXd tension_nN, sigma_nN;  ///< of each
     double gain = 0;                ///< how much less misfit all of them leave
   };
   /// Least squares with tensions of zero or more; those that would push are left out, the hardest pushing first.
-  Told told_of(std::vector<Pair> pairs) const {
+  FittedPairs fit_pairs(std::vector<Pair> pairs) const {
     while (!pairs.empty()) {
       const MatrixXd V = chords(places_um_, pairs);
       const MatrixXd inverse =
@@ -229,8 +229,8 @@ class FibresTogether {
   }
   /// Crossing fibres pull at the same four adhesions whichever two belong together: partners are exchanged between two
   /// pairs as long as all of them together then leave less misfit.
-  Told with_best_partners(std::vector<Pair> pairs) const {
-    double best = told_of(pairs).gain;
+  FittedPairs with_best_partners(std::vector<Pair> pairs) const {
+    double best = fit_pairs(pairs).gain;
     for (bool has_changed = true; has_changed;) {
       has_changed = false;
       for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -238,7 +238,7 @@ class FibresTogether {
           for (const std::size_t end : {std::size_t{0}, std::size_t{1}}) {
             std::vector<Pair> exchanged = pairs;
             std::swap(exchanged[i][1], exchanged[j][end]);
-            const double gain = told_of(exchanged).gain;
+            const double gain = fit_pairs(exchanged).gain;
             if (gain <= best * (1 + 1e-9)) continue;
             best = gain;
             pairs = std::move(exchanged);
@@ -247,7 +247,7 @@ class FibresTogether {
         }
       }
     }
-    return told_of(std::move(pairs));
+    return fit_pairs(std::move(pairs));
   }
 
  private:
@@ -317,19 +317,19 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   }
   const Scores there = left.scores_of(components);
   const FibresTogether together(std::move(places_um), there.information / variance, there.scores / std::sqrt(variance));
-  FibresTogether::Told told = together.with_best_partners(std::move(pairs));
-  const auto gains = [&] { return VectorXd(told.tension_nN.cwiseQuotient(told.sigma_nN).cwiseAbs2()); };
-  for (Index least = 0; !told.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {
-    told.pairs.erase(told.pairs.begin() + least);
-    told = together.told_of(std::move(told.pairs));
+  FibresTogether::FittedPairs fitted = together.with_best_partners(std::move(pairs));
+  const auto gains = [&] { return VectorXd(fitted.tension_nN.cwiseQuotient(fitted.sigma_nN).cwiseAbs2()); };
+  for (Index least = 0; !fitted.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {
+    fitted.pairs.erase(fitted.pairs.begin() + least);
+    fitted = together.fit_pairs(std::move(fitted.pairs));
   }
   std::vector<MissingFibre> best;
-  for (std::size_t k = 0; k < told.pairs.size(); ++k) {
-    const auto [a, b] = told.pairs[k];
+  for (std::size_t k = 0; k < fitted.pairs.size(); ++k) {
+    const auto [a, b] = fitted.pairs[k];
     const auto [first, second] = std::minmax(ends[a], ends[b]);
     best.push_back({.start_adhesion_id = adhesions[first].adhesion_id,
                     .end_adhesion_id = adhesions[second].adhesion_id,
-                    .tension_nN = told.tension_nN[static_cast<Index>(k)],
+                    .tension_nN = fitted.tension_nN[static_cast<Index>(k)],
                     .chi_squared_gain = gains()[static_cast<Index>(k)]});
   }
   std::ranges::stable_sort(best, std::greater(), &MissingFibre::chi_squared_gain);

@@ -20,8 +20,8 @@ struct FibreGroup {
   std::vector<int> indices;  ///< into EnsembleFit::fibre_ids
   Estimate sum_nN;
 };
-/// Fibres joined by correlations beyond −0.95: the partner then takes nine tenths of what the beads tell of each.
-std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit);
+/// Fibres joined by correlations beyond −0.95: the partner then takes nine tenths of the beads' information on each.
+std::vector<FibreGroup> fibres_not_distinguished(const EnsembleFit& fit);
 /// Of the tensions, from the beads' noise.
 MatrixXd correlation_of(const EnsembleFit& fit);
 
@@ -29,7 +29,7 @@ MatrixXd correlation_of(const EnsembleFit& fit);
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
                                        const network::Contractile& first_network, const std::vector<int>& adhesion_ids);
 
-/// What the beads tell of each tension. Influence: by how many of its standard errors a tension changes (on the first
+/// How the beads determine each tension. Influence: by how many of its standard errors a tension changes (on the first
 /// mesh) where a bead's displacement component changes by one of its own, as the fit weighs beads and meshes.
 struct Influence {
   VectorXd variance;               ///< by tension: sum of the squared influence over all components
@@ -53,7 +53,7 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 constexpr std::size_t kMostMissingFibres = 24;
 
 /// The best ones, no adhesion twice, at most `kMostMissingFibres`, found together: tensions and gains are of each
-/// beside the others. A gain is kept where chance would reach it in one cell of a hundred, all pairs tried
+/// given the others. A gain is kept where chance would reach it in one cell of a hundred, all pairs tried
 /// (Bonferroni), errors of the model and of the segmentation counted.
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          const SegmentationErrors& segmentation = {}, int threads = 1);
@@ -64,7 +64,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
 LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adhesions,
                                const std::vector<MissingFibre>& fibres, Index n_last);
 
-/// Variance of each component of the adhesions' forces, as the beads tell them, by errors of the adhesions' ellipses:
+/// Variance of each component of the adhesions' forces, as the beads show them, by errors of the adhesions' ellipses:
 ///
 ///   σ = |F| √( (δ/b)² + (ε/2)² + φ² ),
 ///

@@ -35,7 +35,7 @@ VectorXd loads_nN(const MeshForces& mean, Index dimension) {
   return loads;
 }
 
-/// Of one further mesh about the mean of these: all adhesions and meshes together tell it.
+/// Of one further mesh about the mean of these: all adhesions and meshes together determine it.
 double least_phi_nN(const std::vector<MeshForces>& meshes, const VectorXd& mean_nN, double sum_of_loads_nN) {
   const auto n = static_cast<double>(meshes.size());
   double squares = 0;
@@ -76,22 +76,22 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   }
   const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - followed.cols());
   const double measured = per_phi > 0 ? std::max(0.0, beyond_noise / per_phi) : 0;
-  // From few adhesions the misfit tells next to nothing of single forces: of twenty numbers a third, of one nothing.
+  // From few adhesions the misfit shows next to nothing of single forces: of twenty numbers a third, of one nothing.
   constexpr Index kEnough = 20;
-  const bool is_told = data.n_felt - followed.cols() >= kEnough;
+  const bool is_known = data.n_felt - followed.cols() >= kEnough;
   const double phi = std::max(least, measured);
   return {.phi_nN = phi,
           .least_phi_nN = least,
-          .measured_phi_nN = is_told ? measured : least / (1 + static_cast<double>(meshes.size())),
+          .measured_phi_nN = is_known ? measured : least / (1 + static_cast<double>(meshes.size())),
           .phi_of_mean_nN = least / (1 + static_cast<double>(meshes.size())),
           .loads_nN = loads,
           .of_single =
-              is_told && left_of_squares > 0 ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares) : 1,
+              is_known && left_of_squares > 0 ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares) : 1,
           .force_variance_nN2 = phi * loads,
           .stated_variance_nN2 = phi * loads,
           .cell_variance_nN2 = measured * loads,
           .noise_variance = noise_variance,
-          .is_told = is_told,
+          .is_known = is_known,
           .dimension = data.dimension};
 }
 
@@ -208,7 +208,7 @@ VectorXd by_component(const VectorXd& by_adhesion, Index dimension) {
   return by_adhesion.transpose().replicate(dimension, 1).reshaped();
 }
 
-/// An adhesion that nothing pulls at by this model may still bear something.
+/// An adhesion that nothing pulls at by this model may still carry something.
 VectorXd not_without(const VectorXd& loads_nN) { return loads_nN.cwiseMax(1e-3 * loads_nN.mean()).cwiseMax(1e-300); }
 
 }  // namespace

@@ -1,12 +1,12 @@
 /// The error of the model itself. The cell's own network is one of many that its outline, adhesions and fibres allow,
-/// and no mesh is it. Each adhesion's force therefore has an error e beside the beads' noise n,
+/// and no mesh is it. Each adhesion's force therefore has an error e in addition to the beads' noise n,
 ///
 ///   y = C (R(t) + e) + n,   Var e_a = phi L_a,   L_a = |N_a| + 0.05 |R_a - N_a|,   Var n = s²:
 ///
 /// in proportion to N_a, what the links of the actin network bring to the adhesion, as of a load that many links share
 /// at random, and to a twentieth of what its fibres bring, whose ends spread over it. (Measured on networks of four
 /// formulations, `other_network forces`: phi is the same within a half from loads of 0.03 to 2 nN.) It is not used to
-/// weigh the data (what meshes tell of it adds more noise than it takes away: notes/validation.md) but makes the
+/// weigh the data (what meshes show of it adds more noise than it takes away: notes/validation.md) but makes the
 /// tensions' error bars.
 #pragma once
 
@@ -21,11 +21,11 @@ struct ModelError {
   double phi_nN = 0;           ///< as the misfit calls for, but not below
   double least_phi_nN = 0;     ///< that of one further mesh about the mean of these
   double measured_phi_nN = 0;  ///< as the misfit alone has it, of the cell's network and the mean's together;
-                               ///< the mean's where there are too few adhesions to tell it
-  double phi_of_mean_nN = 0;   ///< what the meshes tell of their mean's own
+                               ///< the mean's if there are too few adhesions to determine it
+  double phi_of_mean_nN = 0;   ///< what the meshes show of their mean's own
   VectorXd loads_nN;           ///< L_a, by component of the forces
   /// Variance of a single adhesion's error over phi L_a. What one adhesion lacks its neighbours have, as a rule: beads
-  /// and tensions see less of that than of errors independent of each other. So do the meshes, and tell by how much.
+  /// and tensions see less of that than of errors independent of each other. So do the meshes, and show by how much.
   double of_single = 1;
   VectorXd force_variance_nN2;  ///< phi L_a, by component of the forces
   /// No less than that, but of adhesions whose forces deviate more what the beads show of them (discrepancy_of): the
@@ -33,7 +33,7 @@ struct ModelError {
   VectorXd stated_variance_nN2;
   VectorXd cell_variance_nN2;  ///< of the cell's own network about the mean, as the beads show it
   double noise_variance = 0;   ///< s²: 1 where the beads' errors are as stated
-  bool is_told = false;        ///< there are adhesions enough for the misfit to tell phi
+  bool is_known = false;       ///< there are enough adhesions for the misfit to determine phi
   Index dimension = 2;         ///< components of a force
 };
 
@@ -74,7 +74,7 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
 /// @param force_variance  of the errors, by component, over s²
 ReducedData whitened(const ReducedData& data, const VectorXd& force_variance, int threads = 1);
 
-// Forces that the adhesions exert beside what the network gives them: the network is a model, and where it is wrong
+// Forces that the adhesions exert besides what the network gives them: the network is a model, and where it is wrong
 // the beads show it (Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001) 425). With e of model_error.h found and not only
 // allowed for,
 //

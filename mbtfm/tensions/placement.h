@@ -67,15 +67,15 @@ using DataOf = std::function<LinearData(const DisplacementField&)>;
 
 /// Gauss–Newton over shift and turn on one network, tensions fitted at each place, until what is left is linear.
 ///
-/// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
-/// field is linear in it, or where no place is found within kFarthest.
+/// auto: off if the beads determine the shift to worse than half the adhesions' mean semi-minor axis, within which
+/// the field is linear in it, or if no place is found within kFarthest.
 /// @param data  of the beads as they are
 /// @param start  a trial with these data
 PlacedCell place_cell(const Cell& cell, const network::Contractile& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, Switch setting, int threads);
 
-/// What came of it beside the fit: shift x, y (um) and turn (rad) with standard errors.
+/// What came of it besides the fit: shift x, y (um) and turn (rad) with standard errors.
 struct FoundPlacement {
   Placement placement;
   Eigen::Vector3d sigma;
@@ -111,7 +111,7 @@ using Carried = std::function<VectorXd(const LinearData&)>;
 
 /// auto: under load where the beads say so. No cell model is asked: forces of the adhesions, all independent, leave the
 /// squares S of the beads, and n ln(S_rest/S_load) is twice the logarithm of the odds, as both states have the same
-/// unknowns. Where `carried` tells that the odds are hopeless, the data under load are not asked for. Fields of other
+/// unknowns. If `carried` shows that the odds are hopeless, the data under load are not asked for. Fields of other
 /// programs may state the places under load already, and simulated cells are made at rest.
 ///
 /// Source: Kass & Raftery, J Am Stat Assoc 90:773, 1995: above 10 the evidence is very strong.

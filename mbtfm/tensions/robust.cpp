@@ -198,7 +198,7 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Matrix
   }
   VectorXd residual = weighted_residual(data, trial.forces_nN), leverage(data.bead_weight.size());
   for (Index b = 0; b < leverage.size(); ++b) {
-    constexpr double kLeast = 0.01;  // a bead that tells all by itself leaves rounding, not a residual
+    constexpr double kLeast = 0.01;  // a bead of leverage 1 leaves rounding, not a residual
     auto own = residual.segment(each * b, each);
     own = numerics::inverse_root(MatrixXd::Identity(each, each) - hat[b], kLeast) * own;
     leverage[b] = hat[b].trace();

@@ -14,7 +14,7 @@ MatrixXd of_free_tensions(const MatrixXd& force_derivatives, const VectorXd& ten
 
 /// The weighted residuals of a trial, each made as large as if the fit did not follow its bead: (1 − H)^(−1/2) r, H the
 /// bead's 2 × 2 block of the hat matrix of motions and tensions, those at zero held there (Cook & Weisberg, Residuals
-/// and Influence in Regression, 1982, 2.2). Beside an adhesion a single bead may tell half of its force.
+/// and Influence in Regression, 1982, 2.2). A single bead near an adhesion may determine half of its force.
 struct Studentized {
   VectorXd residual;  ///< 2·beads
   VectorXd leverage;  ///< by bead: trace of H; they add up to the number of unknowns
@@ -23,7 +23,7 @@ struct Studentized {
 Studentized studentized(const LinearData& data, const Trial& trial, const MatrixXd& force_derivatives);
 
 /// Beads whose residuals Gaussian noise has in less than one case in twenty, exp(−r²/2) < 0.05 q (Rayleigh, r in robust
-/// standard deviations), and that stand alone: the nearest bead does not go along by half. The chance q that a bead is
+/// standard deviations), and that are alone: the nearest bead does not go along by half. The chance q that a bead is
 /// given adds up to 1: half goes to all alike, half by leverage, as a bead that the fit follows can do more harm
 /// (weighted Bonferroni: Genovese, Roeder & Wasserman, Biometrika 93:509, 2006). None where most of the large ones go
 /// along: then the model and not the beads are wrong there, and to discount them would explain the still part of the

@@ -52,7 +52,7 @@ double log_bayes_factor(const Spectrum& s, double kappa) {
 }
 
 double likeliest_kappa(const Spectrum& s) {
-  constexpr double kStep = 1.25, kLeast = 1e-6, kMost = 1e12;  // relative to what stands out of the noise just so
+  constexpr double kStep = 1.25, kLeast = 1e-6, kMost = 1e12;  // relative to what just exceeds the noise
   const double unit = 1 / std::max(s.information.maxCoeff(), 1e-300);
   double best = 0, most = 0;
   for (double kappa = kLeast; kappa < kMost; kappa *= kStep) {

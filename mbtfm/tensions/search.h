@@ -4,7 +4,7 @@
 ///
 /// P takes off what is free to follow, V is the noise's covariance and that of the model's error. Without the block q
 /// has the covariance K (score test: Rao, Math Proc Camb Phil Soc 44:50, 1948); with sizes of variance κ the data speak
-/// for it by log_bayes_factor(). The best block is a cause: the others are asked again beside it.
+/// for it by log_bayes_factor(). The best block is a cause: the others are asked again with it.
 #pragma once
 
 #include <Eigen/Core>
@@ -97,7 +97,7 @@ class Left {
 
 /// Pieces of the surface along the border of the beads' field, of half the breadth of a spread cell and its depth,
 /// beyond which forces act, whatever the forces of this cell are: each by the likelihood of random forces there,
-/// the likeliest first, the others beside it. With the pieces next to them, as no cell ends where a piece does. None
+/// the likeliest first, the others with it. With the pieces next to them, as no cell ends where a piece does. None
 /// is named by chance in 10 000 cells.
 /// @param data  with the motions that are allowed for so far
 std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell& cell, const Gel& gel);

@@ -1,5 +1,5 @@
-/// Forces on candidates for adhesions that nobody saw: how much it matters where the candidates stand. The segmentation
-/// places them twice, and the fit of the second placement tells what the choice is worth.
+/// Forces on candidates for adhesions that nobody saw: how much it matters where the candidates are. The segmentation
+/// places them twice, and the fit of the second placement shows what the choice is worth.
 #pragma once
 
 #include <map>

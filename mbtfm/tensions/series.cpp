@@ -130,7 +130,7 @@ charts::Chart tension_chart(const std::vector<FrameFit>& fits, const std::vector
       track.low.push_back(t.low_nN.value_or(t.tension_nN));
       track.high.push_back(t.high_nN.value_or(t.tension_nN));
       types[t.fibre_id] = type_of(t, fibres);
-      largest = std::max(largest, t.tension_nN);  // a bar of a fibre that no bead tells of may reach beyond
+      largest = std::max(largest, t.tension_nN);  // a bar of a fibre that no bead resolves may reach beyond
     }
   }
   charts::Chart chart("Tensions of the fibres", time_axis(fits, interval_s), from_zero("tension (nN)", largest));
@@ -253,7 +253,7 @@ void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::opti
 std::vector<FrameFit> read_fits(const Path& folder) {
   if (!std::filesystem::is_regular_file(folder / "frames.csv")) return {};
   if (!std::filesystem::is_regular_file(folder / "tracks.csv")) return {};
-  if (!files::CsvTable(folder / "frames.csv").has("displacement_sha256")) return {};  // of a version that did not tell
+  if (!files::CsvTable(folder / "frames.csv").has("displacement_sha256")) return {};  // of a version without it
   std::map<int, FrameFit> fits;
   for (FitOfFrame& row : files::read(folder / "frames.csv", frame_fit_table())) {
     const int frame = row.fit.frame;

@@ -53,10 +53,10 @@ struct FrameFit {
 /// The fits that write_tracks and write_frames put into a folder; none where not both files are there.
 std::vector<FrameFit> read_fits(const Path& folder);
 
-/// The data of a frame whose beads may do more beside forces and common motion. @param forces_nN  of the network, with
+/// The data of a frame whose beads may do more besides forces and common motion. @param forces_nN  of the network, with
 /// which the frame's fit starts
 using AllowMore = std::function<LinearData(LinearData, const VectorXd& forces_nN)>;
-/// A frame's fit with what is found beside it.
+/// A frame's fit with what is found in addition.
 using FindMore = std::function<EnsembleFit(EnsembleFit)>;
 
 /// @param response  of all beads

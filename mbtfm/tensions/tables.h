@@ -1,4 +1,4 @@
-/// The tables that the fit writes beside tensions.csv and adhesion_forces.csv: columns and rows.
+/// The tables that the fit writes in addition to tensions.csv and adhesion_forces.csv: columns and rows.
 #pragma once
 
 #include <optional>

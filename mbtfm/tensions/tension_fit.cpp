@@ -220,7 +220,7 @@ VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, int thre
   VectorXd gradient(n_tensions());
   numerics::parallel_for(n_tensions(), threads, [&](int i) {
     // A third of the digits of a double go into the step, which stays on the allowed side of zero. It must be far above
-    // the 1e-7 of the largest tension that a zero one stands for: below, nothing changes, and who is at zero stays
+    // the 1e-7 of the largest tension that represents a zero one: below, nothing changes, and who is at zero stays
     // there.
     const double step = 1e-5 * std::max(largest, 1e-12);
     VectorXd above = trial.tensions_nN, below = trial.tensions_nN;

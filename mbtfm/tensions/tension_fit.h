@@ -76,7 +76,7 @@ class TensionProblem {
 };
 
 /// The multiple of these tensions that fits best. Forces grow in proportion to the tensions (but for cables beyond
-/// their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps. And the
+/// their rest length), so one trial and one division give it; a start of the wrong size then costs no steps. And the
 /// vertices hardly move, so the second equilibrium starts where the first one is.
 /// @param nearby  a trial of tensions like these, to start the first one from
 Trial scaled_to_data(const TensionProblem& problem, const VectorXd& tensions_nN, const Trial* nearby = nullptr);
@@ -112,12 +112,12 @@ struct FitParameters {
   std::optional<Loss> loss = {};   ///< as the switch robust_loss says; unset: what the residuals call for
   Loss robust_kind = Loss::huber;  ///< one minimum, and 95 % efficient where the noise is Gaussian after all
   TrialDisplacement substrate = TrialDisplacement::compliance;
-  std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
-  int n_meshes = 2;  ///< the fewest that tell the model's error; more take 7 % off that of the tensions (validation.md)
+  std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still shows the forces
+  int n_meshes = 2;  ///< the fewest that give the model's error; more take 7 % off that of the tensions (validation.md)
   double tolerance = 1e-8;      ///< relative change of the tensions at which the fit stops; with noise it stops before
   int max_steps = 100;          ///< of Gauss–Newton: every loop ends
   int max_evaluations = 5000;   ///< of the conjugate gradients
-  double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
+  double far_distance_um = 10;  ///< beads this far outside the outline determine the noise level
   std::optional<double> frame_interval_s = {};  ///< of a time series; unset: tracks go by frame
   int bootstrap = 0;         ///< draws; 0: intervals from the misfit's profile, which are as good and cost nothing
   int surface_lines = 80;    ///< a micrometre for a cell of 80; the time goes with their square
@@ -141,7 +141,7 @@ struct TensionFit {
   std::vector<Milestone> history;
 };
 
-/// A fibre that comes out slack may be a minimum of its own beside that of the taut one.
+/// A fibre that comes out slack may be a minimum of its own, in addition to that of the taut one.
 enum class Search {
   nearest,  ///< the minimum that the start leads to, as near as counts where data or weights change after it: to a
             ///< tenth of a standard error along one direction of twenty

@@ -105,7 +105,7 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
 
   Reconstruction r;
   const double left = residual.squaredNorm() / static_cast<double>(G.rows() - G.cols());
-  // As for the tensions (7): the errors stated, or the larger ones that the misfit tells of.
+  // As for the tensions (7): the errors stated, or the larger ones that the misfit shows.
   const MatrixXd covariance = spectrum.covariance(0, std::max(left, all.beads.stated_variance.value_or(0)));
   r.forces = forces_with_errors(inputs.adhesions, forces, covariance);
   std::vector<Vec2> forces_nN;

@@ -136,7 +136,7 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
   }
   Reconstruction r;
   r.lambda_unit = LambdaUnit::um_per_nN;
-  // sum of F² over adhesions of area a stands for a times the integral of t²
+  // sum of F² over adhesions of area a approximates a times the integral of t²
   const Model model{.compliance = [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); },
                     .n_loads = points.size(),
                     .truth = even_forces(inputs, *gel),
@@ -176,7 +176,7 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
   const double area = parameters.element_um * parameters.element_um;
   Reconstruction r;
   r.lambda_unit = LambdaUnit::um_per_kPa;
-  // sum of t² over elements of area a stands for the integral of t² over a
+  // a times the sum of t² over elements of area a is the integral of t²
   const Model model{.compliance = compliance,
                     .n_loads = centres.size(),
                     .truth = even_forces(inputs, *gel),

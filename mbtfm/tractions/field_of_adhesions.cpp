@@ -12,7 +12,7 @@
 namespace mbtfm::tractions {
 namespace {
 
-/// Tukey's, of residuals whose median tells their scale (Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4); beads
+/// Tukey's, of residuals whose median gives their scale (Maronna, Martin & Yohai, Robust Statistics, 2006, 6.4); beads
 /// with a flag have none. By component.
 VectorXd weights_of(const VectorXd& residual, const VectorXd& as_flagged) {
   const std::vector<double> lengths = inverse::residual_lengths(residual, 2);
@@ -24,7 +24,7 @@ VectorXd weights_of(const VectorXd& residual, const VectorXd& as_flagged) {
   return by_bead.transpose().replicate(2, 1).reshaped().cwiseProduct(as_flagged);
 }
 
-/// The sums of shapes that explain the displacements best with these weights; empty where they do not tell.
+/// The sums of shapes that explain the displacements best with these weights; empty if they do not determine them.
 /// @param n_forces  of the shapes, the first ones
 VectorXd weighted_fit(const MatrixXd& shapes, const VectorXd& displacement_um, const VectorXd& weights, Index n_forces,
                       int threads) {
@@ -65,7 +65,7 @@ std::vector<Vec2> FieldOfAdhesions::um(const DisplacementField& beads) {
     places_um_ = std::move(places_um);
     field_um_.resize(0);
   }
-  // of the same frame again, some beads of which were mended, the last field tells which are astray
+  // of the same frame again, some beads of which were mended, the last field shows which are outliers
   const bool is_again = field_um_.size() == displacement_um.size() &&
                         (displacement_um.array() == displacement_um_.array()).count() > displacement_um.size() / 2;
   VectorXd weights = is_again ? weights_of(displacement_um - field_um_, as_flagged) : as_flagged;

@@ -1,4 +1,4 @@
-/// What adhesions that pull make of all beads, as far as some of the beads tell.
+/// What adhesions that pull make of all beads, as far as some of the beads show it.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,14 +11,14 @@
 namespace mbtfm::tractions {
 
 /// Displacements of all beads by a force on each adhesion and a common affine motion, which explain those without a
-/// flag best: Tukey's loss, so that beads that are astray do not count. To guess by, near adhesions: the gel is taken
+/// flag best: Tukey's loss, so that outliers do not count. To guess by, near adhesions: the gel is taken
 /// for a thick, incompressible layer.
 class FieldOfAdhesions {
  public:
   FieldOfAdhesions(const std::vector<Adhesion>& adhesions, int threads);
-  /// um, of all beads. Empty where there are not ten data for each unknown: a bead would tell much of its own guess.
-  /// Quicker for the places of the last call; of displacements that are mostly those of the last call, what was found
-  /// then tells which beads are astray.
+  /// um, of all beads. Empty where there are not ten data for each unknown: a bead would determine much of its own
+  /// guess. Quicker for the places of the last call; of displacements that are mostly those of the last call, what was
+  /// found then shows which beads are outliers.
   std::vector<Vec2> um(const DisplacementField& beads);
 
  private:

@@ -14,7 +14,7 @@
 namespace mbtfm::tractions {
 
 std::vector<double> lambdas_of(const LatticeProblem& problem) {
-  // From tractions that only the longest waves of the field tell of, to those that its shortest waves tell of: beyond
+  // From tractions that only the longest waves of the field show to those that its shortest waves show: beyond
   // either end nothing changes.
   return lambdas_between(2 * problem.longest_wave_um_per_kPa(), problem.spectrum().smallest_um_per_kPa());
 }

@@ -14,10 +14,10 @@ namespace mbtfm::tractions {
 inline constexpr double kScanTolerance = 1e-2;
 inline constexpr double kTolerance = 1e-3;  ///< in energy: far below any error bar
 
-/// That this problem can tell apart, falling.
+/// That this problem can distinguish, falling.
 std::vector<double> lambdas_of(const LatticeProblem& problem);
 
-/// The criteria over the lambdas that this problem can tell apart. @param solver  of the problem's data: left near one
+/// The criteria over the lambdas that this problem can distinguish. @param solver  of the problem's data: left near one
 LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver);
 
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
@@ -28,7 +28,7 @@ std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes
 std::vector<GroundPatch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
                                     const NodeField& displacements);
 
-/// Forces by adhesion beside the tractions of a lattice: docs/theory/reconstructions.md (16).
+/// Forces by adhesion, in addition to the tractions of a lattice: docs/theory/reconstructions.md (16).
 /// The beads' displacements (times the roots of their weights) come from forces F on the adhesions, from tractions
 /// without a pattern everywhere, and from noise:
 ///
@@ -61,7 +61,7 @@ WaveField smoothed(const LatticeProblem& problem, WaveField waves, ReadOut read_
 std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
                                 double gaussian_um);
 
-// Normal equations of forces beside tractions everywhere, for every weight of these at once.
+// Normal equations of forces together with tractions everywhere, for every weight of these at once.
 
 /// With Y = [D u] and S = P G G Pᵀ, one block recurrence from Y brings S to a block tridiagonal matrix, A_j on its
 /// diagonal and B_j below. Then, for any m,

@@ -45,7 +45,7 @@ class LatticeProblem {
 
   /// Pᵀ u: the displacements on the lattice.
   const NodeField& spread_data() const { return spread_; }
-  /// Pᵀ z of random signs: tells the trace of the influence matrix (Hutchinson 1990).
+  /// Pᵀ z of random signs: estimates the trace of the influence matrix (Hutchinson 1990).
   NodeField spread_signs() const;
   /// u: 2·beads, components in turn, and the roots of their weights
   const VectorXd& data() const { return data_; }

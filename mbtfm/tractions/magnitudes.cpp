@@ -29,7 +29,7 @@ double mean_length(double squared_mean, double variance) {
 
 /// Zero, and from a part of the least error to more than the largest force.
 std::vector<double> deviations_for(double least_error_nN, double largest_nN) {
-  constexpr double kStep = 1.6;  // normal distributions nearer than that are hardly told apart
+  constexpr double kStep = 1.6;  // normal distributions nearer than that are hardly distinguished
   std::vector<double> all = {0};
   for (double s = 0.5 * least_error_nN; s < 2 * largest_nN; s *= kStep) all.push_back(s);
   return all;

@@ -13,10 +13,10 @@ namespace mbtfm::tractions {
 
 namespace {
 
-constexpr std::size_t kFewest = 40;  // beads: half of them, 40 components, tell a deviation to 13 %
+constexpr std::size_t kFewest = 40;  // beads: half of them, 40 components, give a deviation to 13 %
 constexpr int kNeighbours = 20;      // for six numbers each way: their own noise adds a fifth to the variance
 
-/// How far a bead is from what its neighbours predict, in the noise's own measure, and the strain that they tell of.
+/// How far a bead is from what its neighbours predict, in the noise's own measure, and the strain that they show.
 struct Prediction {
   double strain = 0;
   Vec2 residual_um;

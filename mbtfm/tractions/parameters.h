@@ -30,7 +30,7 @@ struct TractionParameters {
   double padding = 1.5;  ///< neighbours' images half a field away: their dipole fields are small
   ReadOut read_out = ReadOut::cells;
   double gaussian_um = 0;  ///< regularisation smooths already
-  double element_um = 2;   ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
+  double element_um = 2;   ///< bem: the finest that some 10 000 beads of 20 nm noise resolve
   double grow_um = 1.5;    ///< smoothed tractions spill over an adhesion's rim by about that
 };
 void declare(stage::ParameterList& list, TractionParameters& parameters);

@@ -168,11 +168,11 @@ struct Refit {
   double deviation_um = 0;  ///< of the Gaussians
 };
 
-/// The penalty that finds the places makes tractions smaller, and gathers them in single nodes as the beads do not tell
-/// neighbours apart. So tractions are fitted once more (Meinshausen, Comput. Stat. Data Anal. 52 (2007) 374), on these
-/// places and those within a bead distance: sums of Gaussians with a Tikhonov penalty by evidence (14). Their width, in
-/// bead distances, is the largest that is as good in (12) as the best within its standard error.
-/// Where each node has its bead, L1 alone does as well, and better without noise: its tractions stay.
+/// The penalty that finds the places makes tractions smaller, and gathers them in single nodes as the beads do not
+/// resolve neighbours. So tractions are fitted once more (Meinshausen, Comput. Stat. Data Anal. 52 (2007) 374), on
+/// these places and those within a bead distance: sums of Gaussians with a Tikhonov penalty by evidence (14). Their
+/// width, in bead distances, is the largest that is as good in (12) as the best within its standard error. Where each
+/// node has its bead, L1 alone does as well, and better without noise: its tractions stay.
 Refit refit(const LatticeProblem& problem, const NodeField& tractions, double bead_distance_um) {
   constexpr double kFiner = 1.5;  // bead distances over the spacing: scattered beads have 2, those on a lattice 1
   constexpr double kDeviations[] = {0, 0.5, 0.7, 1, 1.4, 2, 2.8};

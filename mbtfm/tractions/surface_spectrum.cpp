@@ -38,7 +38,7 @@ double mean_around_zero(const Gel& gel, GelModel model, double side_x_per_um, do
 
 double zero_wave_um_per_kPa(const Gel& gel, GelModel model, Surroundings surroundings, double step_x, double step_y) {
   if (surroundings == Surroundings::open) return mean_around_zero(gel, model, step_x, step_y);
-  // A periodic half-space yields to a mean traction without end: its mean displacement tells nothing, and 0 says so.
+  // A periodic half-space yields to a mean traction without end: its mean displacement shows nothing, and 0 marks that.
   if (model == GelModel::half_space) return 0;
   return gel.thickness_um / substrate::shear_modulus_kPa(gel);  // simple shear: (8) as k -> 0
 }

@@ -14,7 +14,7 @@ using numerics::WaveTransform;
 /// What lies beyond the lattice.
 enum class Surroundings {
   periodic,  ///< its own images: a wave is exactly itself
-  open       ///< nothing more: the lattice is padded, and its zero wave stands for all that are longer than it
+  open       ///< nothing more: the lattice is padded, and its zero wave represents all longer ones
 };
 
 double sinc(double x);

@@ -15,7 +15,7 @@
 namespace mbtfm::cables {
 namespace {
 
-// A tension of zero stands for the limit t -> 0 from above: its cables are given this part of the largest tension. So
+// A tension of zero means the limit t -> 0 from above: its cables are given this part of the largest tension. So
 // slack directions have an equilibrium and derivatives; the forces change by less than 1e-7 of the largest.
 constexpr double kSlackTension = 1e-7;
 // A stretch is known to the rounding of two lengths, at a vertex of some six cables; its force to that part of EA.
@@ -27,7 +27,7 @@ int index_of(const std::vector<int>& sorted, int value) {
   return static_cast<int>(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin());
 }
 
-/// The least tension over the largest, a zero one counted as what it stands for.
+/// The least tension over the largest, a zero one counted as what it means.
 double weakest(const std::vector<double>& tensions_nN) {
   const auto [least, largest] = std::minmax_element(tensions_nN.begin(), tensions_nN.end());
   return *largest > 0 ? std::max(kSlackTension, *least / *largest) : 1;

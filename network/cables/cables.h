@@ -4,7 +4,7 @@
 ///
 /// Convex in x, so the equilibrium for given tensions is the minimiser of U over the free vertices. (In the code the
 /// rest length is smoothed like the length, so that the stretch begins at |x_a − x_b| = l0 exactly.)
-/// A tension of zero stands for its limit from above: where others pull, it counts as 1e-7 of the largest.
+/// A tension of zero means its limit from above: if others pull, it counts as 1e-7 of the largest.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct CableParameters {
   static constexpr int kConjugateSteps = 1'000'000;  ///< ordinary cells take 7 000 to 200 000
   /// EA: force at 100 % strain beyond the rest length (thesis 3.2.3); 0: cables are never longer than they like
   double axial_stiffness_nN = 50;
-  double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can tell
+  double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can resolve
   double force_tolerance = 1e-9;        ///< largest net force on a free vertex, relative to the largest tension
   std::optional<int> max_iterations{};  ///< or kNewtonSteps, kConjugateSteps
   Contraction contraction = Contraction::newton;
@@ -57,7 +57,7 @@ struct GeometryGradient {
 /// share it.
 class CableNetwork final : public network::Contractile {
  public:
-  /// @throws InvalidData where fewer than two adhesions hold the network, or none beside a cut: its equilibrium is a
+  /// @throws InvalidData where fewer than two adhesions hold the network, or none besides a cut: its equilibrium is a
   /// point, or pulls on no substrate
   explicit CableNetwork(Network network, CableParameters parameters = {});
 

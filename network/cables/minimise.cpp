@@ -8,7 +8,7 @@ namespace mbtfm::cables {
 namespace {
 
 // The path of a cold start. Lengths are rounded off over a fifth of an edge at first, the stretch by mu = a hundredth
-// of force times edge: a network at rest, all of whose cables stand at the kink, is smooth then. Each stage sharpens
+// of force times edge: a network at rest, all of whose cables are at the kink, is smooth then. Each stage sharpens
 // twofold, for on fine meshes wider strides leave too many cables on the wrong side of the kink; where one step did for
 // a stage the path is straight, and mu falls twentyfold. At the last mu so few cables are still undecided that the
 // exact energy settles them as fast: where some pull by far less than others, it must be small beside the least pull.
@@ -37,7 +37,7 @@ Vec2 unit_or_less(Vec2 v) {
   return squared > 1 ? (1 / std::sqrt(squared)) * v : v;
 }
 
-/// What a cable's force follows from, kept as unknowns of their own beside the positions and updated by the linearised
+/// What a cable's force follows from, kept as unknowns of their own besides the positions and updated by the linearised
 /// relations. Near the kinks they turn over far less within a step than the force as a function of position does, so
 /// that Newton's method takes full steps however sharp the kinks.
 struct Dual {
@@ -182,8 +182,8 @@ class Descent {
   const FreeVertices& free_;
   const std::vector<Cable>& cables_;
   Rounding rounding_;
-  // Spans are state beside the positions: a collapsed cable is a millionth of an edge long, and its force depends on
-  // its direction, which the difference of two rounded positions does not tell.
+  // Spans are state besides the positions: a collapsed cable is a millionth of an edge long, and its force depends on
+  // its direction, which the difference of two rounded positions does not give.
   std::vector<Vec2> x_, span_, change_;
   std::vector<Pull> pull_, trial_;     // by cable, here and where the line search last tried
   std::vector<Vec2> gradient_, step_;  // by vertex, zero where it is held
@@ -309,7 +309,7 @@ class ConjugateGradients : public Descent {
     last_gradient_ = gradient_;
     const double length = line_search(slope, -slope / curvature(), kConjugateReduction);
     move(length);
-    last_squares_ = length > 0 ? squares : 0;  // 0: begin anew along the gradient
+    last_squares_ = length > 0 ? squares : 0;  // 0: restart along the gradient
     n_stuck_ = length > 0 ? 0 : n_stuck_ + 1;
     return n_stuck_ < 2;
   }

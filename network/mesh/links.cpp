@@ -16,7 +16,7 @@ using Edge = Triangulation::Edge;
 constexpr double kGivenPart = 2.0 / 3;
 constexpr double kSmallestShare = 0.02;  // of an edge across from an obtuse angle: a cable cannot push
 
-/// Width of material that an edge stands for: its length between the circumcentres of its two triangles. With a
+/// Width of material that an edge represents: its length between the circumcentres of its two triangles. With a
 /// tension in proportion to it, the links pull as a sheet of even surface tension does, on any triangulation:
 /// t_ab = sigma (cot alpha + cot beta) l_ab / 2 is minus the gradient of the sheet's area. A triangle that is obtuse
 /// there would count negative.

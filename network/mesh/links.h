@@ -1,4 +1,4 @@
-/// The cables of a mesh: which vertices they join, and the width of material each stands for.
+/// The cables of a mesh: which vertices they join, and the width of material each represents.
 #pragma once
 
 #include <vector>

@@ -17,7 +17,7 @@
 namespace mbtfm::mesh {
 namespace {
 
-/// By vertex, one vertex that stands for its part: what hangs together by links.
+/// By vertex, one vertex that represents its part: what hangs together by links.
 std::vector<int> parts_of(const Network& network) {
   std::vector<int> part(network.vertices_um.size());
   std::iota(part.begin(), part.end(), 0);

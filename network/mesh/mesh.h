@@ -13,7 +13,7 @@ namespace mbtfm::mesh {
 
 enum class LinkWeights {
   equal,  ///< as in the thesis
-  width   ///< of the material that a link stands for
+  width   ///< of the material that a link represents
 };
 constexpr auto words(LinkWeights) { return std::array{"equal", "width"}; }
 

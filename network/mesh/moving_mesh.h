@@ -1,4 +1,4 @@
-/// A constrained triangulation whose vertices move and whose free edges flip, without being built anew.
+/// A constrained triangulation whose vertices move and whose free edges flip, without being rebuilt.
 #pragma once
 
 #include <array>

@@ -18,7 +18,7 @@ constexpr double kSpacing = 0.98;   // of the lattice, in edge lengths
 constexpr double kJitter = 0.15;    // in edge lengths: enough for meshes that differ everywhere
 constexpr double kClearance = 0.5;  // of the seeds from the frame
 
-/// Tells whether a point keeps clear of the lines and the lone vertices of a frame.
+/// Whether a point keeps clear of the lines and the lone vertices of a frame.
 class Clearance {
  public:
   explicit Clearance(const Frame& frame) : frame_(frame), grid_(frame.points_um, 0.5 * frame.size.edge_um()) {

@@ -133,7 +133,7 @@ class Chart {
   void upright(double x, const std::string& style) { marks_.push_back({Mark::Kind::upright, {{x, y_.low}}, style}); }
   void level(double y, const std::string& style) { marks_.push_back({Mark::Kind::level, {{x_.low, y}}, style}); }
   void label(Vec2 at, const std::string& text) { marks_.push_back({Mark::Kind::label, {at}, {}, {}, text}); }
-  /// @param address  "data:image/…" where a page must stand alone
+  /// @param address  "data:image/…" if a page must be self-contained
   void picture(Vec2 corner, Vec2 opposite, const std::string& address) {
     marks_.push_back({Mark::Kind::picture, {corner, opposite}, {}, {}, address});
   }

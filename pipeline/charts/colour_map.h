@@ -1,5 +1,5 @@
-/// Colours that stand for numbers: maps whose lightness rises all the way, so that colour-blind eyes and grey printers
-/// tell them apart.
+/// Colours that represent numbers: maps whose lightness rises all the way, so that colour-blind eyes and grey printers
+/// distinguish them.
 #pragma once
 
 #include <array>

@@ -42,7 +42,7 @@ runner::Sink event_sink() {
 
 void show(const std::string& line) { std::fprintf(stderr, "\r\033[K%s", line.c_str()); }
 
-std::function<void(const runner::StageResult&)> teller(const CommandLine& line) {
+std::function<void(const runner::StageResult&)> reporter(const CommandLine& line) {
   if (line.is_json) return [](const runner::StageResult& result) { stage::print(events_of(result)); };
   if (line.run.is_quiet) return nullptr;
   const auto detail = line.is_verbose ? runner::Detail::all : runner::Detail::brief;
@@ -57,13 +57,13 @@ runner::RunOptions run_options(const CommandLine& line) {
   }
   for (const std::string& text : line.set) options.set.push_back(runner::parse_setting(text));
   options.version = kVersion;
-  options.say = teller(line);
+  options.say = reporter(line);
   if (line.is_json) options.sink = event_sink;
   if (!line.is_json && !options.is_quiet) options.note = say;
   return options;
 }
 
-/// @throws UsageError where no error budget of tensions will tell what was reached
+/// @throws UsageError if no error budget of tensions will show what was reached
 void expect_tensions(const fs::path& cell) {
   const runner::CellStages of = runner::stages_of(cell, runner::read_image_names(cell));
   if (has_fibres(of.kind)) return;
@@ -164,7 +164,7 @@ runner::FoundCells cells_of(const CommandLine& line) {
   return found;
 }
 
-int tell(const runner::Verification& found, const std::string& what) {
+int print_differences(const runner::Verification& found, const std::string& what) {
   for (const std::string& difference : found.differences) stage::print(difference + "\n");
   if (found.differences.empty())
     stage::print(what + ": " + std::to_string(found.n_files) + " files, all as recorded in run.json\n");
@@ -217,12 +217,12 @@ int repeat(const CommandLine& line) {
   if (!files::is_file(line.folder)) runner::require_folder(line.folder, "a cell folder");
   const fs::path run_json = files::is_file(line.folder) ? line.folder : line.folder / "run.json";
   const fs::path inputs = line.inputs.empty() ? run_json.parent_path() : line.inputs;
-  return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
+  return print_differences(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
 }
 
 int verify(const CommandLine& line) {
   runner::require_folder(line.folder, "a cell folder");
-  return tell(runner::verify_cell(line.folder), line.folder.string());
+  return print_differences(runner::verify_cell(line.folder), line.folder.string());
 }
 
 int compare(const CommandLine& line) {

@@ -29,7 +29,7 @@ struct CommandLine {
   std::vector<std::string> further;        ///< arguments for the program that the command becomes
 };
 
-/// On standard error, as a line of mbtfm. On a terminal, what stands on the line before gives way.
+/// On standard error, as a line of mbtfm. On a terminal, what is on the line before gives way.
 void say(const std::string& line);
 
 /// All of them as subcommands that write into `line`, which must outlive the app.

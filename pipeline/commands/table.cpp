@@ -78,7 +78,7 @@ struct Command {
   const char* name;
   Takes takes;
   int (*run)(const CommandLine&);
-  void (*add_flags)(CLI::App&, CommandLine&) = nullptr;  ///< beside those that all have
+  void (*add_flags)(CLI::App&, CommandLine&) = nullptr;  ///< besides those that all have
 };
 const Command kCommands[] = {
     {"demo", Takes::new_cell, demo,

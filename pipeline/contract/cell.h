@@ -36,7 +36,7 @@ struct Adhesion {
   std::optional<double> edge_distance_um{};  ///< from the centre to the outline, holes included; none: not stated
   std::optional<double> probability{};       ///< that it is an adhesion, by the image; none: not known
 };
-/// A candidate of a hexagonal lattice stands for its cell, which is larger than the disc drawn into it; any other
+/// A candidate of a hexagonal lattice represents its cell, which is larger than the disc drawn into it; any other
 /// adhesion for its own area.
 double area_stood_for_um2(const Adhesion& adhesion);
 
@@ -45,7 +45,7 @@ double area_stood_for_um2(const Adhesion& adhesion);
 /// four is as probable as not.
 enum class FibreType { dorsal, arc, ventral, edge, unclassified };
 constexpr auto words(FibreType) { return std::array{"dorsal", "arc", "ventral", "edge", "unclassified"}; }
-/// The first of its name, for labels: types are told apart without colour, too.
+/// The first of its name, for labels: types are distinct without colour, too.
 constexpr char letter_of(FibreType type) { return name_of(type)[0]; }
 inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge,
                                             FibreType::unclassified};

@@ -12,7 +12,7 @@ namespace mbtfm {
 
 namespace {
 
-int tell(const std::string& program, int code, const std::string& message, const std::string& hint = {}) {
+int print_error(const std::string& program, int code, const std::string& message, const std::string& hint = {}) {
   const char* kind = code == exit_code::kBug ? "internal error" : "error";
   std::fprintf(stderr, "%s: %s: %s\n", program.c_str(), kind, message.c_str());
   if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
@@ -44,24 +44,24 @@ int report_current_exception(const std::string& program) {
   try {
     throw;
   } catch (const UsageError& error) {
-    return tell(program, kUsage, error.what());
+    return print_error(program, kUsage, error.what());
   } catch (const InputError& error) {
-    return tell(program, kInput, error.what(), error.hint);
+    return print_error(program, kInput, error.what(), error.hint);
   } catch (const InvalidData& error) {
-    return tell(program, kInput, error.what());
+    return print_error(program, kInput, error.what());
   } catch (const OutOfMemory& error) {
-    return tell(program, kResources, error.report->reason);
+    return print_error(program, kResources, error.report->reason);
   } catch (const NotSolved& error) {
-    return tell(program, kNoAnswer, "not solved: " + error.report->reason);
+    return print_error(program, kNoAnswer, "not solved: " + error.report->reason);
   } catch (const OutputError& error) {
-    return tell(program, kOutput, error.what());
+    return print_error(program, kOutput, error.what());
   } catch (const std::filesystem::filesystem_error& error) {
-    return tell(program, kOutput, error.what());
+    return print_error(program, kOutput, error.what());
   } catch (const Interrupted& error) {
-    return tell(program, kInterrupted, error.what());
+    return print_error(program, kInterrupted, error.what());
   } catch (const std::exception& error) {
-    if (is_want_of_memory(error)) return tell(program, kResources, "out of memory", kNeedLess);
-    return tell(program, kBug, error.what(), "please report this with the command and its inputs");
+    if (is_want_of_memory(error)) return print_error(program, kResources, "out of memory", kNeedLess);
+    return print_error(program, kBug, error.what(), "please report this with the command and its inputs");
   }
 }
 

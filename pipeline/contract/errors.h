@@ -86,7 +86,7 @@ struct InternalError : std::logic_error {
       throw ::mbtfm::InternalError(std::string(__FILE_NAME__) + ":" + std::to_string(__LINE__) + ": " #holds); \
   } while (false)
 
-/// In a catch block: tell what was thrown, with its hint, as an error of `program` on stderr.
+/// In a catch block: report what was thrown, with its hint, as an error of `program` on stderr.
 /// @returns its exit code
 int report_current_exception(const std::string& program);
 

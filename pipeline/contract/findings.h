@@ -65,7 +65,7 @@ bool spoils_cell(const Finding& finding);
 const Finding* worst_of(const std::vector<Finding>& findings);
 bool has_open(const std::vector<Finding>& findings);
 
-/// What a sentence says beside the number.
+/// What a sentence says besides the number.
 struct Shown {
   std::string value = {};  ///< in place of the number
   std::string at = {};

@@ -13,7 +13,7 @@ struct Link {
   int vertex_b = 0;
   int fibre_id = 0;  ///< 0: the actin network
   double rest_length_um = 0;
-  double share = 1;  ///< multiplies its group's tension and its stiffness: the width of material this cable stands for
+  double share = 1;  ///< multiplies its group's tension and its stiffness: the width of material this cable represents
 };
 
 /// How a cable carries its force in equilibrium: slack with its tension alone, taut with more, being longer than at

@@ -34,7 +34,7 @@ bool is_inside(const Range& range, double value);
 /// "a number > 0", for messages and the parameter page.
 std::string describe(const std::string& noun, const Range& range);
 
-/// "the unit is kPa: 8400 Pa is 8.4 kPa": where the value is outside the range as it stands, and inside it in a unit a
+/// "the unit is kPa: 8400 Pa is 8.4 kPa": if the value is outside the range as it is, and inside it in a unit a
 /// thousand times smaller or larger. Empty where it is not. @param name  with its unit
 std::string unit_slip(std::string_view name, double value, const Range& range);
 

@@ -10,7 +10,7 @@ struct Report {
   bool converged = false;
   int iterations = 0;
   double last_change = 0;
-  std::string reason;  ///< one sentence; where not converged: the likely cause and the numbers that tell
+  std::string reason;  ///< one sentence; where not converged: the likely cause and the numbers that show it
 };
 
 }  // namespace mbtfm

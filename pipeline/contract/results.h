@@ -57,10 +57,10 @@ struct MissingAdhesion {
 struct ErrorParts {
   double beads = 0;               ///< noise of the displacements
   double segmentation = 0;        ///< shift, area and angle of the adhesions; free ends of the fibres
-  std::optional<double> mesh{};   ///< one network is not another; none: a single mesh tells nothing of it
+  std::optional<double> mesh{};   ///< one network is not another; none: a single mesh shows nothing of it
   double substrate = 0;           ///< discretisation of the gel, or what its model leaves out
   double solver = 0;              ///< where the iterations stopped
-  double model = 0;               ///< what the misfit calls for beside the beads' noise and the mesh
+  double model = 0;               ///< what the misfit shows besides the beads' noise and the mesh
   std::optional<double> gel{};    ///< modulus, thickness and Poisson's ratio, where their errors are stated
   std::optional<double> place{};  ///< of the cell on the beads, where it was found with the tensions
 };

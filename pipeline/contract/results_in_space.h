@@ -11,7 +11,7 @@ namespace mbtfm {
 struct SurfaceTraction {
   Vec3 position_um, traction_kPa;
   std::optional<Vec3> sigma_kPa;
-  double area_um2 = 0;  ///< that it stands for
+  double area_um2 = 0;  ///< that it represents
   std::optional<double> resolution_um;
   double normal_kPa = 0, tangential_kPa = 0;
   Vec3 displacement_um;

@@ -33,7 +33,7 @@ NameAndUnit for_people(SheetQuantity quantity);
 /// What each source adds to a standard error. In squares they add up to it; none: it was not asked for.
 struct SheetErrorParts {
   std::optional<double> beads = {};      ///< noise of the displacements
-  std::optional<double> motion = {};     ///< that all beads share: how much less they tell beside it
+  std::optional<double> motion = {};     ///< that all beads share: the precision lost by fitting it, too
   std::optional<double> model = {};      ///< what the misfit calls for beyond the beads' noise
   std::optional<double> variation = {};  ///< of the contraction over the sheet, which is taken for even
   std::optional<double> mesh = {};       ///< what is left of it once a finer one has corrected the fit
@@ -59,7 +59,7 @@ struct SheetEstimate {
   SheetQuantity quantity = SheetQuantity::contraction;
   std::string part = {};  ///< of the sheet, where it has parts with contractions of their own; or the bundle
   double value = 0;
-  std::optional<double> sigma = {};           ///< standard error; none where the beads do not tell the quantity
+  std::optional<double> sigma = {};           ///< standard error; none if the beads do not determine the quantity
   std::optional<double> low = {}, high = {};  ///< 95 %; none where the beads set no limit to that side
   bool identifiable = true;                   ///< limited to both sides
   SheetErrorParts parts = {};                 ///< of sigma

@@ -1,4 +1,4 @@
-/// What a run makes of a stage, as run.json tells it.
+/// What a run makes of a stage, as run.json states it.
 #pragma once
 
 #include "pipeline/contract/words.h"

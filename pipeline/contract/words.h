@@ -1,4 +1,4 @@
-/// A choice of a few words is an enum class. Its words stand beside it, once, in its order:
+/// A choice of a few words is an enum class. Its words are beside it, once, in its order:
 ///
 ///   enum class Loss { squares, huber };
 ///   constexpr auto words(Loss) { return std::array{"squares", "huber"}; }
@@ -33,7 +33,7 @@ std::vector<E> values_of() {
   return values;
 }
 
-/// The value that this word stands for, if any.
+/// The value that this word means, if any.
 template <Worded E>
 constexpr std::optional<E> named(std::string_view word) {
   const auto all = words(E{});

@@ -1,4 +1,4 @@
-/// What a long computation may take, and whom it tells how far it has come.
+/// What a long computation may take, and to whom it reports its progress.
 #pragma once
 
 #include <functional>
@@ -7,12 +7,12 @@
 
 namespace mbtfm {
 
-/// Told how far a long work has come (0 to 1) and with what; may throw to cancel. May be empty.
+/// Receives how far a long work has come (0 to 1) and with what; may throw to cancel. May be empty.
 using Progress = std::function<void(double fraction, std::string_view what)>;
 
 struct Work {
   /// Threads alone are work, too.
-  Work(int n_threads = 1, Progress to_tell = {}) : threads(n_threads), progress(std::move(to_tell)) {}
+  Work(int n_threads = 1, Progress report_to = {}) : threads(n_threads), progress(std::move(report_to)) {}
 
   int threads;
   Progress progress;  ///< may be empty

@@ -1,5 +1,5 @@
 /// As accurate as asked for, at the least cost: presets are tried from the cheapest on, and each answer's error budget
-/// says whether it is accurate enough, or what stands in the way.
+/// says whether it is accurate enough, or what prevents it.
 #pragma once
 
 #include <filesystem>
@@ -30,7 +30,7 @@ struct RelativeError {
   double total = 0;
   double beads = 0, segmentation = 0, model = 0;
   double unavoidable = 0;   ///< beads and segmentation together: no amount of computing lowers it
-  bool is_complete = true;  ///< one mesh tells nothing of the mesh's part
+  bool is_complete = true;  ///< one mesh shows nothing of the mesh's part
 };
 /// @throws InvalidData where no fibre pulls
 RelativeError relative_error(const ErrorBudget& budget);

@@ -8,7 +8,7 @@ namespace mbtfm::cost {
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
       {"fast",
-       {{"track", "binning", "2"},              // half the time of tracking; beads that are hard to tell apart are lost
+       {{"track", "binning", "2"},              // half the time of tracking; beads that are hard to resolve are lost
         {"network", "edge_length_um", "2.5"},   // a third of the links, and of the time of their equilibrium
         {"fit", "surface_lines", "40"}},        // drawing the gel's surface finely takes as long as fitting a mesh
        {{"traction", "spacing_beads", "1.06"},  // with noise as near as a finer lattice, but to sparse maps

@@ -68,7 +68,7 @@ void copy_files(const fs::path& from, const fs::path& to) {
     if (files::is_own_file(entry.path())) fs::copy_file(entry.path(), to / entry.path().filename());
 }
 
-/// A folder that looks like the cell, whose stages are run anew by each rung.
+/// A folder that looks like the cell, whose stages are rerun by each rung.
 class Scratch {
  public:
   Scratch(const fs::path& cell, const StudyOptions& options)

@@ -65,7 +65,7 @@ struct Measurement {
 struct Study {
   CellKind kind = {};
   std::string reference;    ///< what errors are against: "the truth", or the finest rung
-  bool has_images = false;  ///< times are those of all stages; else of network and fit, and nothing is segmented anew
+  bool has_images = false;  ///< times are those of all stages; else of network and fit, and nothing is segmented again
   std::vector<Measurement> measurements = {};
 };
 

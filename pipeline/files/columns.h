@@ -33,7 +33,7 @@
 
 namespace mbtfm::files {
 
-inline constexpr int kForPeople = 6;  ///< digits of a result: a tenth of a millionth more than any error bar tells
+inline constexpr int kForPeople = 6;  ///< digits of a result: a tenth of a millionth more than any error bar resolves
 
 struct ColumnOptions {
   Range range{};          ///< of a number, where it is read

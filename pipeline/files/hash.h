@@ -1,4 +1,4 @@
-/// Content hashes, for provenance and to tell what is up to date.
+/// Content hashes, for provenance and to know what is up to date.
 #pragma once
 
 #include <filesystem>

@@ -21,7 +21,7 @@ Finding finding_of(const JsonRecord& record);
 /// The member `findings` of a record; none where it has none, as records of older versions.
 std::vector<Finding> findings_of(const JsonRecord& record);
 
-/// As text, in lines where indent >= 0. JSON is UTF-8: texts that are not, as names of files may be, tell their
+/// As text, in lines where indent >= 0. JSON is UTF-8: texts that are not, as names of files may be, show their
 /// bytes (names.h), keys too.
 std::string json_text(const nlohmann::ordered_json& json, int indent = -1);
 

@@ -18,7 +18,7 @@ std::string byte_shown(char byte);
 /// The text as UTF-8: a byte that belongs to no character is shown as \\xE9, all else stays as it is.
 std::string shown_name(std::string_view bytes);
 /// The file in `folder` whose name is shown so: one of just that name, else one of the same letters (ü as one character
-/// or as two), else one with the bytes that it tells.
+/// or as two), else one with the bytes that it shows.
 std::filesystem::path file_shown_as(const std::filesystem::path& folder, const std::string& name);
 
 /// A letter and a mark behind it as one character, as keyboards write them: ü, where a Mac's file names have u and ¨.

@@ -72,7 +72,7 @@ void expect_no_hole(const fs::path& file) {
   constexpr std::uintmax_t kBlock_bytes = 512;      // of st_blocks, whatever the file system's own are
   constexpr std::uintmax_t kDensest_packing = 100;  // file systems that compress pack texts to a tenth
   struct stat status {};
-  if (stat(file.c_str(), &status) != 0) return;  // reading tells why
+  if (stat(file.c_str(), &status) != 0) return;  // reading reports why
   const auto size = static_cast<std::uintmax_t>(status.st_size);
   const auto taken = kBlock_bytes * static_cast<std::uintmax_t>(status.st_blocks);
   if (!S_ISREG(status.st_mode) || size <= kLargestText_bytes || taken >= size / kDensest_packing) return;
@@ -109,7 +109,7 @@ void make_way(const fs::path& file) {
       throw OutputError("cannot write " + file.string() + ": a folder of that name is there");
     case fs::file_type::not_found:
     case fs::file_type::character:
-    case fs::file_type::none:  // opening it tells why
+    case fs::file_type::none:  // opening it reports why
       return;
     case fs::file_type::regular:
       if (fs::hard_link_count(file, error) < 2) return;

@@ -27,7 +27,7 @@ bool is_own_text(const fs::path& file);
 /// @throws InputError where it is large, and nearly all of it a hole
 void expect_no_hole(const fs::path& file);
 
-/// Where `name` lies, which a file of the folder tells: below the folder, and on no way through a link. The folder
+/// Where `name` lies, which a file of the folder states: below the folder, and on no way through a link. The folder
 /// itself may be reached through links.
 /// @param named_by  for the message: the file that has the name, or the folder
 /// @throws InputError where the name is empty, absolute, leads through `..` or a link, or is no name

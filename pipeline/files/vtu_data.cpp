@@ -49,7 +49,7 @@ class Bytes {
     refuse(element_, std::to_string(n) + " more bytes of data", "the end of the data");
   }
 
-  /// Some more groups of four characters. Padded ones may stand in the middle: sizes and data are encoded apart.
+  /// Some more groups of four characters. Padded ones may be in the middle: sizes and data are encoded apart.
   void decode_next() {
     constexpr int kGroups = 1024;
     const std::size_t before = decoded_.size();

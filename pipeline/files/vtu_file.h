@@ -31,7 +31,7 @@ class VtuFile {
   /// Both ends of each cell. @throws InputError where a cell is no line of two points
   std::vector<double> line_ends() const;
   /// The points of the corners of each polygon of poly_data. @throws InputError where there are none, one has fewer
-  /// than three corners, or strips of triangles stand beside them
+  /// than three corners, or strips of triangles are beside them
   std::vector<std::vector<int>> polygons() const;
 
   struct Array {

@@ -26,7 +26,7 @@ struct BlockMatrix : BlockPattern {
 };
 
 /// What becomes of a pivot lost in rounding (a direction without stiffness): the matrix is refused, or an infinite one
-/// stands for it: the direction does not move.
+/// represents it: the direction does not move.
 enum class LostPivot { fails, holds_still };
 
 struct FactoriseOptions {

@@ -33,7 +33,7 @@ struct EliminationPanel {
   int n_rows_in_columns = 0;  ///< of its rows: those that are columns of the parent
   struct Entry {
     int row, column, slot;  ///< of the panel, of the matrix
-    bool is_turned;         ///< it stands there transposed
+    bool is_turned;         ///< it is transposed there
   };
   std::vector<Entry> entries;
 

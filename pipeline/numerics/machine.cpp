@@ -83,7 +83,7 @@ void restart_as_blas_needs(char** argv) {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
   if (is_mended && !error) execv(program.c_str(), argv);
-  // where that fails, it is slow, or reserve_blas_buffers tells
+  // if that fails, it is slow, or reserve_blas_buffers reports it
 }
 
 void reserve_blas_buffers(int threads) {

@@ -39,7 +39,7 @@ class WaveTransform {
 
   int n_half() const { return n_columns_ / 2 + 1; }
   Eigen::Index n_waves() const { return static_cast<Eigen::Index>(n_half()) * n_rows_; }
-  /// How often wave column i stands in the whole spectrum, over the number of nodes: a sum over the stored waves with
+  /// How often wave column i occurs in the whole spectrum, over the number of nodes: a sum over the stored waves with
   /// these weights is the sum over the nodes (Parseval).
   const Eigen::ArrayXd& weights() const { return weights_; }
 

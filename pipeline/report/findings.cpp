@@ -60,7 +60,7 @@ std::string of_candidates(const Cell& cell) {
              : " " + sentence("cell.candidates-too");
 }
 
-/// Where the beads do not tell the network's tension, its part of the force may come out at any size.
+/// If the beads do not determine the network's tension, its part of the force may come out at any size.
 std::string parts_of_total(const CellResults& results) {
   const auto network = results.tensions.find(0);
   if (network != results.tensions.end() && !network->second.identifiable) return sentence("cell.network-unresolved");
@@ -235,7 +235,7 @@ std::string list_with(const std::vector<std::string>& facts, Items items, bool m
 enum class Judging { fit, traction };
 constexpr auto words(Judging) { return std::array{"fit", "traction"}; }
 
-/// Without one there is nothing that a tick could stand for.
+/// Without one there is nothing that a tick could mean.
 bool was_asked(const Provenance& provenance) {
   return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
     const auto state = named<StageState>(stage.state);

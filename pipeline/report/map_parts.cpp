@@ -95,7 +95,7 @@ AveragedField averaged(const VectorField& field, const Extent& box, double side_
 }
 
 ArrowScale arrow_scale(const std::vector<Vec2>& vectors) {
-  // The longest arrows but for the top 1 %, in px of such a frame: long enough to compare, short enough to tell apart.
+  // The longest arrows but for the top 1 %, in px of such a frame: long enough to compare, short enough to distinguish.
   constexpr double kLongArrow_px = 32;
   std::vector<double> lengths;
   for (const Vec2 v : vectors) lengths.push_back(norm(v));
@@ -127,7 +127,7 @@ std::string arrow_legend(const ArrowScale& scale, const std::string& unit) {
 
 std::string picture_of_squares(const VectorField& field, double side_um, const Extent& box,
                                const ColourScale& colours) {
-  constexpr int kColours = 48;  // neighbours are hardly told apart
+  constexpr int kColours = 48;  // neighbours are hardly distinguished
   // by colour, as paths in a frame whose unit is a hundredth of a side; neighbours of one colour along x are one piece
   std::map<int, std::string> pieces;
   const std::size_t n = field.positions_um.size();

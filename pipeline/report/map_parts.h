@@ -1,4 +1,4 @@
-/// What the report's maps share: frames, colours that stand for numbers, fields of arrows.
+/// What the report's maps share: frames, colours that represent numbers, fields of arrows.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ namespace mbtfm::report {
 /// x to the right, y down, both in um.
 charts::Chart empty_map(const Extent& box, const std::string& title);
 
-/// A map from numbers to colours that differ in lightness, so that colour-blind eyes and grey printers tell them apart.
+/// A map from numbers to colours that differ in lightness, also for colour-blind eyes and grey printers.
 struct ColourScale {
   double low = 0, high = 1;
   std::string label;  ///< with the unit
@@ -38,7 +38,7 @@ struct AveragedField {
   double mean_members = 0;  ///< points a square
 };
 
-/// Side of the squares over which to average: as small as arrows can be told apart, larger where they would hold too
+/// Side of the squares over which to average: as small as arrows can be distinguished, larger where they would hold too
 /// few points for noise to fade.
 double averaging_side_um(const VectorField& field, const Extent& box);
 

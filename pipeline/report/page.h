@@ -39,7 +39,7 @@ std::string html_of(const Table& table, const Download& csv);
 /// Two columns: name, value.
 std::string html_of_pairs(const std::string& caption, const std::vector<std::pair<std::string, std::string>>& pairs);
 
-/// The bytes of a picture as an address, for a page that must stand alone. @param type  "image/jpeg"
+/// The bytes of a picture as an address, for a self-contained page. @param type  "image/jpeg"
 std::string data_address(const Path& picture, const char* type);
 
 /// As HTML what programs write for terminals, too, in plain characters: a page has µ and ±.

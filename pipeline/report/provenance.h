@@ -1,4 +1,4 @@
-/// What run.json tells of how a cell's results came about.
+/// What run.json records of how a cell's results came about.
 #pragma once
 
 #include <filesystem>

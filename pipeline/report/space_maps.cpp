@@ -25,7 +25,7 @@ Chart new_map(const SpaceResults& r, const std::string& title) {
   return empty_map({low - half, high + half}, title);
 }
 
-/// Every vertex stands for a cell of the lattice.
+/// Every vertex represents a cell of the lattice.
 template <class Value, class Colour>
 void draw_cells(Chart& map, const SpaceResults& r, const Value& value, const Colour& colour, const std::string& unit) {
   const Vec2 half = 0.5 * spacing_of(r);
@@ -141,7 +141,7 @@ struct Paper {
   Vec2 px(Vec3 um) const { return px(seen(um).at); }
 };
 
-/// Heights on a coarser lattice where there are more than the eye tells apart.
+/// Heights on a coarser lattice if there are more than the eye resolves.
 struct Heights {
   const HeightMap& map;
   int step = 1;
@@ -187,7 +187,7 @@ void add_facets(const Heights& heights, const TractionsBetween& field, const Col
   }
 }
 
-/// The strongest fifth, so that they can be told apart; none below a tenth of the largest.
+/// The strongest fifth, so that they can be distinguished; none below a tenth of the largest.
 std::vector<const SurfaceTraction*> shown_arrows(const SpaceResults& results) {
   std::vector<const SurfaceTraction*> all;
   for (const SurfaceTraction& t : results.tractions) all.push_back(&t);

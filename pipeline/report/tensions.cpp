@@ -140,7 +140,7 @@ std::vector<std::string> network_row(const CellResults& results, const Tension& 
   return row;
 }
 
-/// The true fibres that no found one stands for, as a sentence.
+/// The true fibres that no found one matches, as a sentence.
 std::string missed_fibres(const Comparison& comparison) {
   std::string list;
   for (const ComparedFibre& fibre : comparison.fibres) {
@@ -165,7 +165,7 @@ const char* bright_colour_of(FibreType type) {
 const char* dashes_of(FibreType type) { return type == FibreType::edge ? ";stroke-dasharray:9 4 2 4" : ""; }
 
 std::string swatch_of(FibreType type, const std::string& colour) {
-  // edge fibres are dashed: eyes that see no colours tell them, too
+  // edge fibres are dashed, to be recognised without colours, too
   return fmt::format("<span class=\"type\" style=\"background:{}\"></span>",
                      type == FibreType::edge
                          ? fmt::format("linear-gradient(90deg,{0} 40%,transparent 40% 60%,{0} 60%)", colour)

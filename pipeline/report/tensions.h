@@ -39,7 +39,7 @@ std::string hover_of(const Adhesion& adhesion, const CellResults& results);
 using charts::colour_of;
 /// Colour of a fibre type, lighter for the dark ground of an image.
 const char* bright_colour_of(FibreType type);
-/// Dashes of its line in maps, as CSS: edge fibres are told by them from the others without colours.
+/// Dashes of its line in maps, as CSS: they distinguish edge fibres from the others without colours.
 const char* dashes_of(FibreType type);
 /// Its mark in legends and tables, as HTML.
 std::string swatch_of(FibreType type, const std::string& colour);

@@ -79,7 +79,7 @@ constexpr const char* kRunRecord = "run.json";
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-/// When run.json was written last, to tell whether this run wrote it.
+/// When run.json was written last, to know whether this run wrote it.
 std::optional<fs::file_time_type> time_of_record(const fs::path& cell) {
   std::error_code is_missing;
   const auto time = fs::last_write_time(cell / kRunRecord, is_missing);
@@ -94,14 +94,14 @@ ProcessLimits limits_of_cell(const ProcessLimits& of_stage) {
   return {.seconds = kMostStages * *of_stage.seconds + kMargin_s};
 }
 
-void tell_that_unreadable(const std::exception& error, BatchCell& cell) {
+void mark_unreadable(const std::exception& error, BatchCell& cell) {
   cell.exit_code = exit_code::kInput;
   cell.how = "unreadable";
   cell.message = first_line(error.what());
 }
 
-/// What run.json tells, if anything.
-void tell_of_failure(BatchCell& cell) {
+/// The failure in run.json, if any.
+void add_recorded_failure(BatchCell& cell) {
   try {
     const std::optional<RecordedFailure> failure = recorded_failure(cell.cell);
     if (!failure) return;
@@ -109,7 +109,7 @@ void tell_of_failure(BatchCell& cell) {
     cell.how = failure->how;
     if (!failure->message.empty()) cell.message = first_line(failure->message);
   } catch (const InputError& error) {
-    tell_that_unreadable(error, cell);
+    mark_unreadable(error, cell);
   }
 }
 
@@ -133,7 +133,7 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
     outcome.how = how_it_ended(result);
     outcome.message = first_line(error_in(result.last_output));
     if (time_of_record(cell) == record_before) return outcome;
-    tell_of_failure(outcome);
+    add_recorded_failure(outcome);
   } catch (const OutputError& error) {  // no log, no process: this cell's matter, not the batch's
     outcome.exit_code = exit_code::kOutput;
     outcome.how = "not started";
@@ -150,7 +150,7 @@ struct Look {
   BatchCell outcome;                     ///< of a cell that is done, or cannot be read
 };
 
-/// Is there anything to do for the cell? Where it is not even readable, `mbtfm run` tells why.
+/// Is there anything to do for the cell? If it is not even readable, `mbtfm run` reports why.
 Look look_at(const fs::path& cell, const RunOptions& options) {
   Look look;
   look.outcome.cell = cell;
@@ -171,9 +171,9 @@ Look look_at(const fs::path& cell, const RunOptions& options) {
   } catch (const CellBusy&) {
     look.finding = Look::Finding::busy;
   } catch (const InputError& error) {
-    tell_that_unreadable(error, look.outcome);
+    mark_unreadable(error, look.outcome);
   } catch (const fs::filesystem_error& error) {
-    tell_that_unreadable(error, look.outcome);
+    mark_unreadable(error, look.outcome);
   } catch (const OutputError&) {
     // to run
   }
@@ -364,7 +364,7 @@ std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const
     if (look.finding == Look::Finding::done || look.outcome.exit_code != 0) return;
     outcomes[i].exit_code = exit_code::kFailed;
     outcomes[i].how = look.finding == Look::Finding::busy ? "being run" : "not run";
-    tell_of_failure(outcomes[i]);
+    add_recorded_failure(outcomes[i]);
     outcomes[i].is_left_undone = outcomes[i].failed_stage.empty();
   });
   return outcomes;

@@ -37,7 +37,7 @@ struct BatchOptions {
   std::vector<std::string> arguments = {};           ///< passed on to `mbtfm run`
   int jobs = 1;                                      ///< cells at a time
   int threads = 1;                                   ///< to look at cells with
-  RunOptions run;                                    ///< what `arguments` say, to tell which cells are done
+  RunOptions run;                                    ///< what `arguments` say, to know which cells are done
   std::function<void(const std::string&)> say;       ///< a line for each cell that was run
   std::function<void(const BatchCell&)> ended = {};  ///< called for each cell when it has ended, one at a time
   std::function<void(const std::string&)> show;      ///< a line that the next one replaces, for a terminal

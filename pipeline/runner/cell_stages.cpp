@@ -93,7 +93,7 @@ std::string why_in_space(const fs::path& cell, const toml::table& toml) {
   return {};
 }
 
-/// What is seen of the cell beside its beads is laid onto the surface from above.
+/// What is seen of the cell besides its beads is laid onto the surface from above.
 bool has_cell(const fs::path& cell, const ImageNames& images) {
   return has_image(cell, images, "adhesion") || has_image(cell, images, "actin") || files::is_own_file(cell / kOutline);
 }
@@ -151,7 +151,7 @@ CellStages stages_as_sheet(const fs::path& cell, const ImageNames& images, const
   if (settings.bundles) read_file(last, "bundles", "1_segment/fibre_points.csv");
   of.why += "; its outline is found in the images";
   of.stages = {std::move(segment), std::move(track), std::move(last)};
-  of.first = {0};  // where the cell holds its gel tells which bead is which
+  of.first = {0};  // where the cell holds its gel shows which bead is which
   of.chains = {{1}};
   return of;
 }
@@ -213,7 +213,7 @@ CellStages stages_of(const fs::path& cell, const ImageNames& images) {
   if (of.why.empty()) {
     of.kind = CellKind::plane;
     of.stages = stages();
-    of.first = {0};  // where the cell holds its gel tells which bead is which
+    of.first = {0};  // where the cell holds its gel shows which bead is which
     of.chains = {{1}, {2}};
     return of;
   }

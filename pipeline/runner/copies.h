@@ -9,7 +9,7 @@
 
 namespace mbtfm::runner {
 
-/// What tells a cell from all others: the beads' field that it was found from, and where it lies in it.
+/// What distinguishes a cell from all others: the beads' field that it was found from, and where it lies in it.
 struct CellInField {
   std::string field_sha256;  ///< empty: there is none, and it is no copy
   Polygon outline_um = {};   ///< empty: not known; it is the whole field then

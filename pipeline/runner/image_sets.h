@@ -12,7 +12,7 @@ namespace mbtfm::runner {
 /// "adhesion={cell}_pax.tif": which files are images of this kind, and the part of their path that names the cell.
 struct ImagePattern {
   std::string key;      ///< of [images] in cell.toml
-  std::string pattern;  ///< path below the folder; {cell} and * stand for any text, ? for a letter, none for a slash
+  std::string pattern;  ///< path below the folder; {cell} and * match any text, ? for a letter, none for a slash
 };
 
 /// @throws UsageError where the key is none of [images], or the pattern does not contain {cell} exactly once

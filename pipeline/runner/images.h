@@ -50,7 +50,7 @@ struct ImageMatch {
   std::vector<fs::path> files = {};  ///< in alphabetical order
   std::string pattern;
 };
-/// Files of `folder` that a name or glob (*, ?, [abc] in its last part) stands for, or one of several with | between
+/// Files of `folder` that a name or glob (*, ?, [abc] in its last part) matches, or one of several with | between
 /// them. A file of exactly that name wins over a glob.
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob);
 

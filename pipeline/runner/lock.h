@@ -48,7 +48,7 @@ class CellLock {
   LockFile file_;
 };
 
-/// Held while run.json is read and written anew, which concerns all stages. Waits for its turn.
+/// Held while run.json is read and rewritten, which concerns all stages. Waits for its turn.
 class RunRecordLock {
  public:
   explicit RunRecordLock(const std::filesystem::path& cell);

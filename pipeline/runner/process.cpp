@@ -205,7 +205,7 @@ std::string error_in(const std::string& output) {
   std::istringstream lines(output);
   std::string errors, last;
   for (std::string line; std::getline(lines, line);) {
-    line.erase(0, line.rfind('\r') + 1);  // npos + 1 is 0; before it stands a progress line that was overwritten
+    line.erase(0, line.rfind('\r') + 1);  // npos + 1 is 0; before it is a progress line that was overwritten
     if (line.starts_with("\033[K")) line.erase(0, 3);
     if (line.empty()) continue;
     if (!errors.empty() || line.find("error: ") != std::string::npos) errors += (errors.empty() ? "" : "\n") + line;

@@ -18,7 +18,7 @@ void watch_interrupts();
 void throw_if_interrupted();
 
 /// Beyond them it is killed. Memory is what it holds, looked at ten times a second. A limit of the system's
-/// (setrlimit) would refuse it more instead, which libraries do not bear: OpenBLAS asks again for ever.
+/// (setrlimit) would refuse it more instead, which libraries do not survive: OpenBLAS asks again for ever.
 struct ProcessLimits {
   std::optional<double> seconds;
   std::optional<std::uint64_t> memory_bytes = {};

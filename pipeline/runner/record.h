@@ -35,7 +35,7 @@ std::filesystem::path output_file(const std::filesystem::path& cell, const Stage
 
 /// Empty where there is none. @throws InputError where it is malformed, or names outputs outside of the stage's folder
 std::optional<StageRecord> read_record(const std::filesystem::path& cell, const Stage& stage);
-/// What the stage reported when it ran last; none where there is no record, or a damaged one: the run itself tells.
+/// What the stage reported when it ran last; none if there is no record, or a damaged one: the run reports that.
 std::optional<StageReport> report_of(const std::filesystem::path& cell, const Stage& stage);
 /// Before a stage begins: from now on its outputs may be a mixture of two runs.
 /// @param record_before  of a stage that keeps frames of the run before: what that run said of them stays; else empty
@@ -58,8 +58,8 @@ void complete_record(const std::filesystem::path& record_file, const StageRecord
 
 /// By stage, the tables of cell.toml that it depends on, as JSON with sorted keys.
 using Settings = std::map<std::string, std::string>;
-/// @param stages   of the cell; settings of their own stand in place of what cell.toml says
-/// @param beneath  values that stand in place of defaults
+/// @param stages   of the cell; settings of their own replace what cell.toml says
+/// @param beneath  values that replace defaults
 /// @throws InputError
 Settings read_settings(const std::filesystem::path& toml_file, const std::vector<Stage>& stages,
                        const std::vector<Setting>& beneath = {});

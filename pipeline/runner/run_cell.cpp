@@ -23,8 +23,8 @@ bool contains_name(const std::vector<std::string>& names, const std::string& nam
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// The command as run.json tells it: paths relative to the cell folder, the program by its name.
-std::vector<std::string> command_to_tell(std::vector<std::string> command, const fs::path& cell) {
+/// The command as run.json states it: paths relative to the cell folder, the program by its name.
+std::vector<std::string> recorded_command(std::vector<std::string> command, const fs::path& cell) {
   command.front() = fs::path(command.front()).filename().string();
   const std::string prefix = (cell / "").string();
   for (std::string& argument : command)
@@ -49,7 +49,7 @@ StageFailure failure_of(const ProcessResult& result) {
           .message = error_in(result.last_output)};
 }
 
-/// Do a part of a stage's work; where that throws, the outcome tells of it, too.
+/// Do a part of a stage's work; if that throws, the outcome shows it, too.
 void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
   try {
     work();
@@ -146,7 +146,7 @@ class CellRun {
       throw;
     }
     // A report of what is no more must not outlive a kill between here and the next one.
-    std::error_code is_folder;  // then writing the report tells
+    std::error_code is_folder;  // then writing the report fails
     if (has_work) fs::remove(cell_ / "report.html", is_folder);
     outcome.ended = numerics::utc_now();
     write_run_record(cell_, options_, outcome);
@@ -280,7 +280,7 @@ class CellRun {
                      .settings = now.settings,
                      .inputs = now.inputs,
                      .outputs = outputs},
-                    {.command = command_to_tell(command, cell_),
+                    {.command = recorded_command(command, cell_),
                      .seconds = result.seconds,
                      .peak_memory_MB = result.peak_memory_MB});
     outcome.was_run = true;
@@ -322,7 +322,7 @@ class CellRun {
   const RunOptions& options_;
   ImageNames images_;
   CellStages of_;
-  std::vector<Setting> given_;  // beside cell.toml
+  std::vector<Setting> given_;  // besides cell.toml
   Settings settings_;
   HashCache hashes_;
   std::mutex saying_;
@@ -391,7 +391,7 @@ bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome&
   const std::string& last = now.stages.back().stage;
   const bool is_last_asked = options.only.empty() || contains_name(options.only, last);
   if (is_last_asked && !files::is_own_file(cell / "report.html")) return false;
-  return run_record_tells_of(cell, options);
+  return run_record_is_complete(cell, options);
 }
 
 }  // namespace mbtfm::runner

@@ -72,7 +72,7 @@ CellOutcome run_cell(const fs::path& cell, const RunOptions& options);
 /// What run_cell would find, without starting anything: by stage, its status. @throws InputError, UsageError
 CellOutcome look_at_cell(const fs::path& cell, const RunOptions& options);
 
-/// Of look_at_cell: there is nothing left to do for the stages asked for, and run.json and the report tell of it.
+/// Of look_at_cell: there is nothing left to do for the stages asked for, and run.json and the report show it.
 bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome& now);
 
 /// Does the stage accept this cell.toml? It prints why not. @throws StageFailed where it does not

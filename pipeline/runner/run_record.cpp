@@ -97,7 +97,7 @@ ordered_json stage_entry(const Stage& stage, const StageOutcome& recorded, const
   return entry;
 }
 
-/// The file that each key of [images] stands for.
+/// The file that each key of [images] names.
 ordered_json images_in(const fs::path& cell) {
   const ImageNames names = read_image_names(cell);
   ordered_json images = ordered_json::object();
@@ -182,7 +182,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   files::write_whole(cell / "run.json", files::json_text(run, 1) + "\n");
 }
 
-bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {
+bool run_record_is_complete(const fs::path& cell, const RunOptions& options) {
   const fs::path file = cell / "run.json";
   if (!files::is_own_file(file)) return false;
   // The line as we write it, outside of any string, as these hold no line breaks: spares parsing thousands of files.

@@ -21,13 +21,13 @@ constexpr auto words(RunOutcome) { return std::array{"done", "failed", "unfinish
 /// @throws OutputError
 void write_run_record(const fs::path& cell, const RunOptions& options, const CellOutcome& outcome);
 
-/// run.json is there and tells that every stage asked for is done.
-bool run_record_tells_of(const fs::path& cell, const RunOptions& options);
+/// run.json is there and states that every stage asked for is done.
+bool run_record_is_complete(const fs::path& cell, const RunOptions& options);
 
-/// The state of a stage that run.json tells of; empty where it tells of none.
+/// The state of a stage in run.json; empty if it has none.
 std::string recorded_state(const fs::path& cell, const std::string& stage);
 
-/// "segment", "exit code 3", …: the failure that run.json tells of; empty where it tells of none.
+/// "segment", "exit code 3", …: the failure in run.json; empty if it has none.
 struct RecordedFailure {
   std::string stage, how = {}, message = {};
 };

@@ -1,4 +1,4 @@
-/// Are the files of a cell still those that its run.json tells of, and does it come out the same once more?
+/// Are the files of a cell still those that its run.json lists, and does it come out the same once more?
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@ struct Verification {
 /// @throws InputError where there is no run.json, or a damaged one
 Verification verify_cell(const fs::path& cell);
 
-/// Repeat the run that `run_json` tells of in the new cell folder `out`: its inputs where they lie (below `inputs`,
+/// Repeat the run that `run_json` records in the new cell folder `out`: its inputs where they lie (below `inputs`,
 /// which is the old cell folder as a rule), their hashes checked, its parameters, and its version, or `note` says that
 /// this is another one. Then compare all outputs.
 /// @throws InputError where an input is gone or has changed, or where `out` is there already; what run_cell throws

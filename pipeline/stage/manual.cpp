@@ -148,7 +148,7 @@ std::string brief_meaning(const DeclaredOption& option) {
   return text;
 }
 
-/// In single quotes of a shell, where `quote` stands for one of them within.
+/// In single quotes of a shell, where `quote` replaces one of them within.
 std::string quoted(const std::string& text, const std::string& quote) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? quote : std::string(1, c);

@@ -16,7 +16,7 @@ namespace mbtfm::stage {
 
 struct DeclaredOption {
   std::string flag;   ///< "--model"; empty: positional
-  std::string name;   ///< of what a positional stands for, or of the option's value: "CELL", "FILE"
+  std::string name;   ///< of what a positional means, or of the option's value: "CELL", "FILE"
   std::string group;  ///< "Inputs"
   std::string meaning;
   bool takes_value = false;

@@ -63,7 +63,7 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um);
 
 // What errors leave sure of forces: a small adhesion's may be noise.
 
-/// Adhesions of this traction (kPa) or more bear half of the force that is there at least: forces less two standard
+/// Adhesions of this traction (kPa) or more carry half of the force that is there at least: forces less two standard
 /// errors, over areas. A single adhesion drawn too small does not change it. @param forces  by adhesion
 double traction_of_half_the_force_kPa(const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions);
 struct Load {

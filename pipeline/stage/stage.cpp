@@ -97,7 +97,7 @@ std::vector<std::string> arguments_of(int argc, char** argv, const ParameterList
     const std::string table = argument.substr(2, point - 2), key = argument.substr(point + 1, end - point - 1);
     const auto meant =
         std::ranges::find_if(list.all(), [&](const Parameter& p) { return p.table == table && p.name == key; });
-    if (meant != list.all().end()) argument.replace(2, end - 2, meant->flag);  // else it is refused as it stands
+    if (meant != list.all().end()) argument.replace(2, end - 2, meant->flag);  // else it is refused as it is
   }
   return arguments;
 }
@@ -175,7 +175,7 @@ Progress progress_for(const std::string& stage, Reader reader) {
     const int percent = static_cast<int>(100 * fraction);
     if (!is_shown || percent == last) return;
     last = percent;
-    constexpr double kLong_s = 5, kLittle = 0.02;  // shorter work ends before one asks; too little tells no rate
+    constexpr double kLong_s = 5, kLittle = 0.02;  // shorter work ends before one asks; too little shows no rate
     const double gone_s = watch.seconds();
     std::optional<double> left_s;
     if (gone_s > kLong_s && fraction > kLittle) left_s = gone_s * (1 - fraction) / fraction;
@@ -190,7 +190,7 @@ Progress progress_for(const std::string& stage, Reader reader) {
 }
 
 /// The last lines of a program that was started by hand.
-void tell(const std::string& stage, const StageReport& report, double seconds, Reader reader) {
+void print_end(const std::string& stage, const StageReport& report, double seconds, Reader reader) {
   if (reader == Reader::program) {
     write_event({{"event", "stage"},
                  {"stage", stage},
@@ -304,7 +304,7 @@ void commit(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) files::put_in_place(temporary, destination);
 }
 
-/// What was noticed, doubted and assumed beside what the stage itself reports.
+/// What was noticed, doubted and assumed besides what the stage itself reports.
 void add_findings(StageReport& report, const StageContext& context) {
   std::vector<Finding> findings;
   for (const Doubt& doubt : context.doubts) {
@@ -344,7 +344,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     if (!line.record.empty()) write_record(line.record, description, list, context, report, started, seconds);
     expect_all_replaceable(context);
     commit(context);
-    tell(description.name, report, seconds, whose);
+    print_end(description.name, report, seconds, whose);
     return report.converged ? kDone : kNotSolved;
   } catch (...) {
     discard(context);

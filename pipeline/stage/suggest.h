@@ -23,7 +23,7 @@ std::string did_you_mean(const std::vector<std::string>& known, std::string_view
 std::string suggestion(const CLI::App& app, const std::string& error);
 
 /// A text for whoever writes cell.toml and no flags: "--loss huber" becomes "loss = "huber" in [fit]", and what a text
-/// offers beside cell.toml goes. Flags of a command that the text names stay.
+/// offers besides cell.toml goes. Flags of a command that the text names stay.
 /// @param images  flags of files, and the keys of [images] that `mbtfm run` takes them from
 std::string in_keys(const ParameterList& list, const std::map<std::string, std::string>& images,
                     const std::string& text);

@@ -112,7 +112,7 @@ void warn_of_space(const Study& study, const Measure& resolution, std::vector<st
   }
 }
 
-/// Tests by observation that no test by cell bears out.
+/// Tests by observation that no test by cell confirms.
 void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warnings) {
   constexpr double kLevel = 0.05;
   for (const Comparison& by_value : m.comparisons) {

@@ -30,8 +30,8 @@ struct Interval {
 Interval wilson_interval(double share, double n);
 
 /// A share of all observations of all cells, with Wilson's interval at the number of independent observations that
-/// would scatter as much as the cells do. Source: Korn & Graubard, Survey Methodology 24, 193 (1998). Where none or all
-/// have the property the cells cannot tell how they scatter: each then counts once.
+/// would scatter as much as the cells do. Source: Korn & Graubard, Survey Methodology 24, 193 (1998). If none or all
+/// have the property the cells do not show how they scatter: each then counts once.
 struct Share {
   double value = 0;
   Interval interval = {};  ///< 95 %

@@ -161,7 +161,7 @@ Figure forces_by_cell(const Study& study) {
           .charts = {chart}};
 }
 
-/// "force (nN)" without what stands in brackets.
+/// "force (nN)" without what is in brackets.
 std::string without_unit(const std::string& label) { return label.substr(0, label.find(" (")); }
 
 Figure force_correlations(const Study& study, const Analysis& analysis) {

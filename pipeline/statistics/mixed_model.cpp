@@ -36,10 +36,10 @@ struct Design {
   SparseMatrix of_cell, Z;             ///< 1 where the row is of the cell; where it is of the cell and kind
   VectorXd y = {};
   std::vector<Component> components;
-  std::vector<bool> is_scatter_told;  ///< by kind: a group has two observations of it
+  std::vector<bool> is_scatter_identifiable;  ///< by kind: a group has two observations of it
   double smallest_residual = 0;
 
-  int n_kinds() const { return static_cast<int>(is_scatter_told.size()); }
+  int n_kinds() const { return static_cast<int>(is_scatter_identifiable.size()); }
 };
 
 void check_data(const std::vector<Observation>& observations) {
@@ -53,7 +53,7 @@ void check_data(const std::vector<Observation>& observations) {
   if (values.size() < 2) throw InvalidData("the sample", "values that differ", "all equal");
 }
 
-/// Without scatter within groups and without errors nothing tells how well the means are known.
+/// Without scatter within groups and without errors nothing shows how well the means are known.
 void check_scatter(const Design& design) {
   const VectorXd n = design.X.colwise().sum();
   const VectorXd means = (design.X.transpose() * design.y).cwiseQuotient(n);
@@ -92,17 +92,17 @@ bool has_group_of_two_cells(const std::vector<Observation>& rows) {
       rows, [&](const Observation& o) { return cell_of.try_emplace(o.group, o.cell).first->second != o.cell; });
 }
 
-std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
+std::vector<bool> identifiable_scatter(const std::vector<Observation>& rows) {
   int n_kinds = 0;
   for (const Observation& o : rows) n_kinds = std::max(n_kinds, o.kind + 1);
   std::map<std::pair<int, int>, int> n_of;  // group, kind
-  std::vector<bool> is_told(static_cast<std::size_t>(n_kinds), false);
+  std::vector<bool> is_identifiable(static_cast<std::size_t>(n_kinds), false);
   for (const Observation& o : rows)
-    if (++n_of[{o.group, o.kind}] > 1) is_told[o.kind] = true;
-  return is_told;
+    if (++n_of[{o.group, o.kind}] > 1) is_identifiable[o.kind] = true;
+  return is_identifiable;
 }
 
-/// The random effects that the design can tell from the scatter and from each other.
+/// The random effects that the design can distinguish from the scatter and from each other.
 std::vector<Component> components_of(const Design& design) {
   const std::vector<Observation>& rows = design.rows;
   const Index n = design.Z.rows(), n_of_kind = design.Z.cols(), n_cells = design.of_cell.cols();
@@ -123,7 +123,7 @@ Design design_of(std::vector<Observation> observations) {
   std::ranges::stable_sort(design.rows, [](const Observation& a, const Observation& b) { return a.cell < b.cell; });
   add_blocks(design);
   design.components = components_of(design);
-  design.is_scatter_told = scatter_told(design.rows);
+  design.is_scatter_identifiable = identifiable_scatter(design.rows);
   const Index n = static_cast<Index>(design.rows.size());
   int n_groups = 0;
   for (const Observation& o : design.rows) n_groups = std::max(n_groups, o.group + 1);
@@ -308,7 +308,7 @@ VectorXd newton_step(const Derivatives& d, const VectorXd& v, const VectorXd& lo
   return step;
 }
 
-/// Uphill, for where Newton's step misses: the residuals may be so small beside their errors that they tell next to
+/// Uphill, for where Newton's step misses: the residuals may be so far below their errors that they show next to
 /// nothing of the curvature. About as long as the expected one wants it, which for n levels of variance w is n / 2 w².
 VectorXd uphill_step(const Design& design, const State& s, const Derivatives& d) {
   double error = 0;
@@ -351,7 +351,7 @@ void add_variances(const Design& design, const State& s, const Derivatives& d, c
     const auto kind = static_cast<std::size_t>(component.kind);
     if (component.term == Term::cell) fit.cell_variance = variance;
     if (component.term == Term::cell_kind) fit.cell_kind_variance = variance;
-    if (component.term == Term::residual && !design.is_scatter_told[kind]) continue;
+    if (component.term == Term::residual && !design.is_scatter_identifiable[kind]) continue;
     if (component.term == Term::residual) fit.residual_variance[kind] = variance;
     if (is_held) continue;
     estimated.push_back(k);

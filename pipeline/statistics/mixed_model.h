@@ -20,7 +20,7 @@ struct Observation {
 
 /// y = mean(group) + a(cell) + b(cell, kind) + e(kind) + measurement error, all normal and independent, with the
 /// variances of a, b and of e by kind unknown. a is left out where no cell has two observations, b where no cell has
-/// two kinds or no kind two observations in a cell: it could not be told from the others. Both are left out where no
+/// two kinds or no kind two observations in a cell: it would not be identifiable. Both are left out where no
 /// group has two cells: the groups' means take up all that cells differ by.
 struct MixedFit {
   Eigen::VectorXd mean = {};                 ///< by group

@@ -15,7 +15,7 @@ namespace {
 
 using charts::readable;
 
-/// By replicate, in the order of the alphabet; one without a name where none are told.
+/// By replicate, in the order of the alphabet; one without a name if none are given.
 std::vector<std::string> replicates_of(const Study& study) {
   std::set<std::string> names;
   for (const StudyCell& cell : study.cells) names.insert(cell.replicate);

@@ -27,7 +27,7 @@ using report::html_escaped;
 
 bool has(const std::vector<int>& ids, int id) { return std::ranges::find(ids, id) != ids.end(); }
 
-/// Which lines the numbers of fibres stand for: they change if the cell is segmented again.
+/// Which lines the numbers of fibres mean: they change if the cell is segmented again.
 std::string segmentation_of(const Path& cell) {
   const Path file = cell / "1_segment/fibre_points.csv";
   constexpr std::size_t kDigits = 12;

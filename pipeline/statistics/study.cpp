@@ -131,7 +131,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
   return c;
 }
 
-/// Why a cell cannot enter, as its folder tells; empty: it can.
+/// Why a cell cannot enter, as its folder shows; empty: it can.
 std::string obstacle(const Path& cell, CellKind kind) {
   for (const std::string& file : in_study(kind).files)
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
@@ -226,8 +226,8 @@ bool is_measured(const Tension& t) {
   for (const LeftOutCell& cell : left_out) ++n_of[cell.reason];
   std::vector<std::string> reasons;
   for (const auto& [reason, n] : n_of) reasons.push_back(std::to_string(n) + ": " + reason);
-  constexpr std::size_t kTold = 5;
-  if (reasons.size() > kTold) reasons.resize(kTold);
+  constexpr std::size_t kListed = 5;
+  if (reasons.size() > kListed) reasons.resize(kListed);
   throw InputError(folder.string(), "at least one finished cell that enters",
                    "none of " + std::to_string(left_out.size()) + (reasons.empty() ? "" : " (" + listed(reasons) + ")"),
                    "cells that are not finished: mbtfm batch " + folder.string() +
@@ -323,8 +323,8 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     const std::string name = cell.lexically_relative(folder).generic_string();
     names.push_back(name == "." ? fs::weakly_canonical(cell).filename().string() : name);
   }
-  const CellNotes told = notes_of(names, parameters.condition_from, parameters.replicate_from, table);
-  const std::vector<CellNote>& notes = told.of_cells;
+  const CellNotes noted = notes_of(names, parameters.condition_from, parameters.replicate_from, table);
+  const std::vector<CellNote>& notes = noted.of_cells;
   const std::vector<Review> reviews = reviews_of(folder, names, folders);
   const std::vector<std::string> excluding = excluding_findings(parameters);
   std::vector<std::optional<StudyCell>> read(folders.size());
@@ -351,7 +351,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   leave_out_copies(folders, names, read, reasons);
   Study study;
   study.folder = folder;
-  study.warnings = told.warnings;
+  study.warnings = noted.warnings;
   study.n_fibre_types = parameters.fibre_types;
   std::vector<std::string> condition_of_cell;
   for (std::size_t i = 0; i < folders.size(); ++i) {

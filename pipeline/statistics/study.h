@@ -89,7 +89,7 @@ inline constexpr const char *kReview = "review.csv", *kAccepted = "accepted", *k
 struct StudyCell {
   std::string name;            ///< its folder, relative to the study's
   int condition = 0;           ///< index into Study::conditions
-  std::string replicate = {};  ///< day, dish or animal; empty: not told
+  std::string replicate = {};  ///< day, dish or animal; empty: not given
   Cell cell = {};
   std::vector<AdhesionForce> forces = {};
   std::vector<Tension> tensions = {};
@@ -158,7 +158,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
 
 struct CellNote {
   std::string condition = {};          ///< empty where none are asked for
-  std::string replicate = {};          ///< day, dish or animal; empty where none are told
+  std::string replicate = {};          ///< day, dish or animal; empty if none are given
   std::string reason_to_exclude = {};  ///< empty: it enters
 };
 

@@ -1,4 +1,4 @@
-/// What goes wrong with pictures in laboratories, beside noise.
+/// What goes wrong with pictures in laboratories, besides noise.
 #pragma once
 
 #include <cstdint>

@@ -54,7 +54,7 @@ struct CellParameters {
   double brightness_log_sd = 0.25;     ///< of adhesions and fibres: they differ by a quarter
 };
 
-/// What actin looks like beside the course of its fibres. Brightness is relative to that of an adhesion.
+/// What actin looks like besides the course of its fibres. Brightness is relative to that of an adhesion.
 struct ActinParameters {
   int n_ruffles = 0;                  ///< folds of the membrane near the edge, bright in actin
   double ruffle_brightness = 1;       ///< 0.5 to 1.2 of this

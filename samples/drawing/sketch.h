@@ -40,7 +40,7 @@ bool has_room(const Sketch& sketch, const Adhesion& adhesion);
 void draw_outline(Sketch& sketch, Random& random);
 /// Draw one fibre of the type and the adhesions at its ends, which grow with its tension.
 void draw_fibre(Sketch& sketch, FibreType type, double tension_nN, Random& random);
-/// Draw a ventral fibre alongside the last one. Where `tension_nN` needs large adhesions these stand staggered.
+/// Draw a ventral fibre alongside the last one. Where `tension_nN` needs large adhesions these are staggered.
 void draw_neighbour(Sketch& sketch, double tension_nN, Random& random);
 /// Draw all fibres of a dense cell: edge bundles, carpets of ventral fibres that fan out, merge and cross, fans of
 /// dorsal fibres, stacks of arcs; and the adhesions that hold them, some of which hold two or three.

@@ -26,7 +26,7 @@ constexpr std::uint64_t kFirstSimulationSeed = 0x73696d00;
 /// So that the noise of beads beyond the field is not that of those in it.
 constexpr std::uint64_t kBeyond = 0x62657900;
 
-/// The simulation's network. The width of material that a cable stands for is counted in cables of the reference mesh:
+/// The simulation's network. The width of material that a cable represents is counted in cables of the reference mesh:
 /// tension and stiffness by width are then those of the cell, whatever the mesh.
 Network span(const Cell& cell, const drawing::ScenarioParameters& p) {
   mesh::NetworkParameters parameters = formulation(p.mechanics.simulation_network);

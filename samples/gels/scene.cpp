@@ -201,7 +201,7 @@ Eigen::Vector3d traction(const FieldUnderASurface& field, const Surface& surface
 
 struct Row {
   Vec2 at;
-  double area = 0;  ///< of the surface that it stands for
+  double area = 0;  ///< of the surface that it represents
 };
 /// Fine near the patches, coarse elsewhere.
 std::vector<Row> rows_of(const Surface& surface, const std::vector<Bump>& bumps, double field_um) {

@@ -31,7 +31,7 @@ struct SpaceParameters {
   double traction_kPa = 3;      ///< in the middle of a patch (thesis 2.4)
   double bead_depth_um = 30;    ///< beads lie as deep under the surface
   double axial_noise = 3;       ///< noise along z over that across: what confocal microscopes have
-  double outlier_fraction = 0;  ///< of the beads have a random displacement beside the noise (thesis fig. 2.7)
+  double outlier_fraction = 0;  ///< of the beads have a random displacement besides the noise (thesis fig. 2.7)
   double outlier_box_um = 10;   ///< side of the box it is drawn from
   int surface_beads = 0;        ///< of another colour, on the surface
   double z_step_um = 0.5;       ///< of the slices

@@ -275,12 +275,12 @@ std::vector<Excess> drawn_excess(const PairFields& f, double density, const Eige
   return all;
 }
 
-/// Each noise and its opposite are as likely. Neither 0 nor 1, which no number of experiments tells.
-double chance_to_tell(const std::vector<Excess>& experiments, double force) {
-  double n_told = 0.5;
+/// Each noise and its opposite are as likely. Neither 0 nor 1, which no number of experiments shows.
+double chance_to_resolve(const std::vector<Excess>& experiments, double force) {
+  double n_resolved = 0.5;
   for (const Excess& e : experiments)
-    for (const double sign : {-1, 1}) n_told += least_excess(e, sign * force) > kTold;
-  return n_told / (2 * static_cast<double>(experiments.size()) + 1);
+    for (const double sign : {-1, 1}) n_resolved += least_excess(e, sign * force) > kResolved;
+  return n_resolved / (2 * static_cast<double>(experiments.size()) + 1);
 }
 
 /// Of all densities, by distance.
@@ -329,7 +329,7 @@ std::optional<double> PairResolution::least_distance_um(double force_nN, double 
   const double force = force_nN / (youngs_modulus_kPa * noise_um);
   double before = 0;
   for (std::size_t i = 0; i < distance_um_.size(); ++i) {
-    const double chance = chance_to_tell(excess_[i].at(density), force);
+    const double chance = chance_to_resolve(excess_[i].at(density), force);
     if (chance >= kChance) {
       if (i == 0) return touching_um();
       // the square root of the excess is nearly linear in the distance's logarithm, and so is the chance's normal

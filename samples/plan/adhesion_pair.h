@@ -1,4 +1,4 @@
-/// When beads tell two adhesions apart.
+/// When beads resolve two adhesions.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,10 +10,10 @@
 namespace mbtfm::plan {
 
 /// Two adhesions of one size that pull alike, on a line along x, at a distance from centre to centre. The fit of two
-/// knows where they are, as their image tells, and finds both forces. The fit of one finds the place and the force of a
-/// single adhesion of this size. Both have four numbers. They count as told apart where the fit of one misses the beads
-/// by more: chi² larger by kTold, odds of 90 to 1, in kChance of all experiments.
-inline constexpr double kTold = 9, kChance = 0.8;
+/// knows where they are, as their image shows, and finds both forces. The fit of one finds the place and the force of a
+/// single adhesion of this size. Both have four numbers. They count as resolved if the fit of one misses the beads by
+/// more: chi² larger by kResolved, odds of 90 to 1, in kChance of all experiments.
+inline constexpr double kResolved = 9, kChance = 0.8;
 
 /// chi² of one adhesion's fit less that of the fit of two, in one experiment, over the places of the one: a² times the
 /// first column + 2a times the second + the third, where the forces are a times noise and modulus. With beads at places
@@ -30,7 +30,7 @@ struct BeadVolume {
   double axial_noise = 1;  ///< noise along z over that along the surface
 };
 
-/// How many experiments are drawn, at how many distances. 800: the distance that four in five tell is then known to
+/// How many experiments are drawn, at how many distances. 800: the distance that four in five resolve is then known to
 /// some 4 %.
 struct PairDraws {
   int n_distances = 8, n_experiments = 800;
@@ -43,7 +43,7 @@ struct PairDraws {
 class PairResolution {
  public:
   PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um2, int threads);
-  /// Of beads in a volume, which move along z, too, and forces into the gel beside those along it: where nothing else
+  /// Of beads in a volume, which move along z, too, and forces into the gel besides those along it: where nothing else
   /// pulls.
   PairResolution(const Gel& gel, double area_um2, const std::vector<double>& beads_per_um3, const BeadVolume& volume,
                  const PairDraws& draws, int threads);

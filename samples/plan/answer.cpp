@@ -55,7 +55,7 @@ std::string checked_with(const Drawn& d, const std::string& density, const std::
                   sentence(verdict));
 }
 
-/// Whether two of them are told apart. @param touching_um  below it they touch
+/// Whether two of them are resolved. @param touching_um  below it they touch
 std::string apart(std::optional<double> least_distance_um, double touching_um) {
   if (!least_distance_um) return sentence("plan.never-apart");
   return sentence(*least_distance_um > touching_um ? "plan.apart" : "plan.apart-touching", about(*least_distance_um));
@@ -133,7 +133,7 @@ std::string needed_text(const SpacePlan& plan, std::optional<double> beads_per_u
                        : "more than " + about(most_beads_per_um3(plan.asked.densities));
 }
 
-/// Standard errors allow for tractions beside the patches. Where there are none, experiments err by less.
+/// Standard errors allow for tractions besides the patches. If there are none, experiments err by less.
 std::string about_drawn_in_space(const Drawn& d) {
   const double allowed = allowed_of(d);
   const char* verdict = d.error_over_predicted > 1 + allowed   ? "plan.does-not-hold"

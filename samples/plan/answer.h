@@ -1,4 +1,4 @@
-/// A plan as a whole, what it says in words, and as pictures and a page that stands alone.
+/// A plan as a whole, what it says in words, and as pictures and a self-contained page.
 #pragma once
 
 #include "pipeline/contract/numbers.h"

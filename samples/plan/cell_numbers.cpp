@@ -12,7 +12,7 @@ namespace mbtfm::plan {
 
 namespace {
 
-/// Of a list; the scatter of one fibre tells nothing.
+/// Of a list; one fibre shows no scatter.
 struct Moments {
   double mean = 0, sd = 0;
 };

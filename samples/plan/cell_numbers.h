@@ -25,7 +25,7 @@ struct Scatter {
 /// Of the scene: its own fibres' scatter, and between cells what the parameters say.
 std::vector<Scatter> scatter_of(const Scene& scene, const Computed& computed, const Point& point, double between_cells);
 /// The same with means and scatter of a finished study: statistics/types.csv and variances.csv in its folder.
-/// @throws InputError where a file is missing or malformed, or tells the scatter of no type
+/// @throws InputError if a file is missing or malformed, or states the scatter of no type
 std::vector<Scatter> scatter_of_study(const std::filesystem::path& statistics, std::vector<Scatter> scatter);
 
 /// Chance that a two-sided t test at 5 % of the means of two groups of n cells each, m fibres in each cell, sees a

@@ -74,7 +74,7 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
 }
 
 /// Density at which a tension's standard error is the target; infinite where what is left without noise is more, or
-/// beads would stand closer than a nanometre.
+/// beads would be closer than a nanometre.
 double needed_beads_per_um2(const Computed& c, std::size_t label, double target_nN, double scale) {
   const double other_nN = c.model.tensions[label].total_nN();
   if (other_nN >= target_nN) return std::numeric_limits<double>::infinity();

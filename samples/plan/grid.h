@@ -8,17 +8,17 @@
 
 namespace mbtfm::plan {
 
-/// No more beads can be told apart: their images melt together.
+/// No more beads can be resolved: their images melt together.
 double most_beads_per_um2(const Scene& scene);
 
-/// One gel stands for all: its answer falls with the modulus. @see Precision
+/// One gel represents all: its answer falls with the modulus. @see Precision
 struct Computed {
   KnownCell cell;
   BeadsOnGel densest;
   Densities densities;
   ModelErrors model;
 };
-/// @throws UsageError where so few beads tell nothing, or so many melt together
+/// @throws UsageError if so few beads determine nothing, or so many melt together
 Computed compute(const Scene& scene, const Asked& asked, const Work& work);
 
 Grid grid_of(const Scene& scene, const Asked& asked, const Computed& computed, int threads);

@@ -1,5 +1,5 @@
 /// What a plan knows of its cell whatever gel and beads are: forces, how they follow the tensions, and by how much a
-/// fit errs whose beads are exact. And how exactly beads can tell tensions and forces: the Cramér–Rao bound.
+/// fit errs whose beads are exact. And how exactly beads can determine tensions and forces: the Cramér–Rao bound.
 #pragma once
 
 #include <Eigen/Core>

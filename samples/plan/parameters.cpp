@@ -11,7 +11,7 @@ namespace mbtfm::plan {
 
 namespace {
 
-constexpr std::size_t kMostNumbers = 12;  // of a list: curves of more cannot be told apart
+constexpr std::size_t kMostNumbers = 12;  // of a list: curves of more cannot be distinguished
 
 /// None if the text is anything else.
 std::optional<double> as_number(const std::string& text) {

@@ -64,17 +64,17 @@ struct ExpectedOf {
   double share_within = 0;  ///< of the n
   double smallest_seen_nN = 0;
   std::optional<double> resolution_um = {};      ///< in space: at the patches
-  std::optional<double> least_distance_um = {};  ///< of two adhesions whose forces are told apart where neither network
+  std::optional<double> least_distance_um = {};  ///< of two adhesions whose forces are resolved if neither network
                                                  ///< nor background pulls; none: they never are
-  double degrees = 0;                            ///< in space: how many numbers the beads tell
+  double degrees = 0;                            ///< in space: how many numbers the beads determine
   double largest_displacement_um = 0;
   double left_out = 0;  ///< of the displacement, by linear elasticity
 };
 using Expected = ExpectedOf<Quantity>;
 using SpaceExpected = ExpectedOf<SpaceQuantity>;
 
-/// What a cell on a gel needs. No less than the least density that was asked for: few beads tell less than the law has
-/// it.
+/// What a cell on a gel needs. No less than the least density that was asked for: few beads determine less than the
+/// law predicts.
 struct Needed {
   double youngs_modulus_kPa = 0, noise_um = 0;
   std::optional<double> density;  ///< so that the middle fibre or patch meets the target; none: no density does, or in

@@ -24,7 +24,7 @@ namespace mbtfm::plan {
 
 namespace {
 
-/// No fibre of a cell pulls less in the simulator; and one that hangs loose tells nothing of what a taut one shows.
+/// No fibre of a cell pulls less in the simulator; and a loose one shows nothing of a taut one's effect.
 constexpr double kLeastTension_nN = 0.05;
 
 Extent whole_field(const drawing::MicroscopeParameters& m) {
@@ -144,7 +144,7 @@ void set_volume(SpaceScene& scene, const std::vector<BeadInSpace>& beads) {
   if (depths.size() < kFewest)
     throw InputError("2_track/displacement_3d.csv", "at least 10 beads below the surface, not flagged",
                      std::to_string(depths.size()), "run the cell again: mbtfm run");
-  scene.bead_depth_um = numerics::quantile(depths, 0.95);  // a few may be astray
+  scene.bead_depth_um = numerics::quantile(depths, 0.95);  // a few may be outliers
   scene.own_beads_per_um3 = static_cast<double>(depths.size()) / scene.volume_um3();
 }
 
@@ -211,7 +211,7 @@ bool is_cell_in_space(const std::filesystem::path& folder) {
 
 namespace {
 
-/// In a plan no bead is astray, where mixture is least squares to the last digit and other losses are not.
+/// In a plan no bead is an outlier: mixture is then least squares to the last digit, and other losses are not.
 std::vector<std::string> warnings_of(spatial::BeadLoss loss) {
   using enum spatial::BeadLoss;
   if (loss == l2 || loss == mixture) return {};

@@ -195,7 +195,7 @@ Needed needed_of(const SpaceScene& scene, const Asked& asked, const SpaceForesee
   return needed_by(E, noise_um, std::move(needed));
 }
 
-/// Gels on which the beads tell less of the tractions than any map needs.
+/// Gels on which the beads determine fewer numbers of the tractions than any map needs.
 void add_few_numbers(const Asked& asked, SpaceGrid& grid) {
   constexpr double kFewNumbers = 24;  // as of the stage
   for (const double E : asked.youngs_modulus_kPa) {

@@ -12,7 +12,7 @@
 namespace mbtfm::plan {
 
 /// The gel's answer to tractions at the places of beads, as many as two draws and the drawn experiments are parts of.
-/// One gel stands for all moduli: see spatial::Foresight.
+/// One gel represents all moduli: see spatial::Foresight.
 struct SpacePool {
   std::vector<BeadInSpace> beads;  ///< with exact displacements and errors of 1 um across
   spatial::Problem problem;

@@ -34,7 +34,7 @@ struct NamedField {
 void require_same_field(const NamedField& cell, const NamedField& beads);
 
 /// The pixel size of two images of one field: the one given, or else the calibration that they have.
-/// @throws InputError where neither tells it, or they contradict each other
+/// @throws InputError if neither states it, or they contradict each other
 double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um);
 
 /// A finding where the image is a JPEG.

@@ -33,7 +33,7 @@ enum class PixelsAre { intensities, labels };
 struct PlaneChoice {
   std::string prefix = "image";  ///< of its parameters' names, for hints
   std::string channel = {};      ///< number from 1, or name; empty: the only one, and of an RGB image the mean
-  std::string z = kProjection;   ///< a slice from 1, or the brightest of all: what stands out is in focus somewhere
+  std::string z = kProjection;   ///< a slice from 1, or the brightest of all: what is bright is in focus somewhere
   std::optional<int> time = {};  ///< frame from 1; unset: the only one
   std::optional<int> page = {};  ///< from 1, as it lies in the file, whatever it shows; unset: by the other three
   bool may_lack_pixels = false;  ///< NaN is a pixel without a value, and not an error

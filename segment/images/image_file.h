@@ -60,7 +60,7 @@ void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_
 void require_packed_bytes(const std::filesystem::path& file, std::uint64_t n_bytes, std::uint64_t most_by_byte);
 inline constexpr std::uint64_t kMostByDeflate = 1032;  // 258 bytes of two bits
 
-/// The image's calibration as its TIFF tags tell it.
+/// The image's calibration as its TIFF tags state it.
 struct TiffCalibration {
   std::string description;                      ///< ImageDescription; empty: none
   std::optional<double> x_resolution_per_unit;  ///< XResolution

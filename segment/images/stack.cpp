@@ -97,7 +97,7 @@ Stack stack_of_ome(const OmeImage& ome, const FileOfPages& file) {
     int page = p.first_page;
     std::size_t at = place_of[first];
     for (int n = 0; at < planes.size() && (!p.n_planes || n < *p.n_planes); ++n) {
-      // a plane may be told of twice; a damaged file tells of all of them over and over
+      // a plane may be listed twice; a damaged file lists all of them over and over
       if (++n_assigned > 2 * planes.size())
         throw InvalidData("OME-XML", "TiffData that tell of each plane once", "the same planes over and over");
       put(planes[at++], page++);

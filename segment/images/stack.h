@@ -48,7 +48,7 @@ struct Stack {
 
 /// A file as it lies on the disk.
 struct FileOfPages {
-  std::string name;  ///< without its folder, to tell it from the others of an OME set
+  std::string name;  ///< without its folder, to distinguish it from the others of an OME set
   int n_pages = 1;
 };
 

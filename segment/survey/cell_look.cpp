@@ -79,7 +79,7 @@ std::string text_of(const Seen& seen) {
   return text + "\n";
 }
 
-void tell_copies(std::vector<Seen>& seen) {
+void mark_same_pictures(std::vector<Seen>& seen) {
   std::map<std::string, std::size_t> first;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i].sha256.empty()) continue;

@@ -34,7 +34,7 @@ struct Seen {
 /// For a terminal.
 std::string text_of(const Seen& seen);
 /// A folder that was copied has the same picture in another file. Cells of one picture share the file.
-void tell_copies(std::vector<Seen>& seen);
+void mark_same_pictures(std::vector<Seen>& seen);
 /// What to say if the disk has no room for the results; empty: it has.
 std::string disk_doubt(const std::filesystem::path& folder, std::size_t n_cells);
 /// On the page what could not be looked at is a row, too.

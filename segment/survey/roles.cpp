@@ -26,7 +26,7 @@ bool has_any(std::string_view name, const Words& words) {
   return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != name.npos; });
 }
 
-/// Empty where the name tells nothing.
+/// Empty if the name shows no role.
 std::string key_of(const std::string& file) {
   const std::string name = files::lower_case(file);
   const bool is_adhesion = has_any(name, kAdhesion), is_actin = has_any(name, kActin);

@@ -16,10 +16,10 @@ std::vector<std::string> frames_in(const std::filesystem::path& folder);
 
 struct Roles {
   std::map<std::string, std::string> files;  ///< by key of [images]: adhesion, actin, beads_stressed, beads_relaxed
-  std::vector<std::string> unknown;          ///< names that tell nothing, or that several files share
+  std::vector<std::string> unknown;          ///< names that show no role, or that several files share
 };
 
-/// A name tells by the words that laboratories use in it ("cell3_paxillin.tif", "beads_after_trypsin.tif"). Where two
+/// A name shows its role by words that laboratories use ("cell3_paxillin.tif", "beads_after_trypsin.tif"). Where two
 /// files fit a key, it stays open, and both are unknown. The only folder whose name speaks of beads or of times and
 /// that has pictures has the stressed beads' frames.
 Roles roles_of(const std::filesystem::path& folder);

@@ -24,7 +24,7 @@ struct Survey {
   std::vector<std::string> doubts;  ///< each: what was found, its limit and what to do
 };
 
-/// @throws InputError where no image tells the pixel size and cell.toml neither, or images that must be of one size are
+/// @throws InputError if neither an image nor cell.toml states the pixel size, or images that must be of one size are
 /// not
 Survey survey(const CellImages& images, int threads);
 

@@ -113,7 +113,7 @@ class Automatic final : public substrate::Substrate {
   std::vector<Effect> effects() const override {
     const std::lock_guard lock(mutex_);
     substrate::GelEffects effects = model_ ? effects_ : decide(gel_, parameters_, {});
-    // the model's time stands at the effect that called for it
+    // the model's time is at the effect that called for it
     for (Effect* e :
          {&effects.surface, &effects.strain, &effects.grading, &effects.sides, &effects.vertical, &effects.thickness}) {
       if (!e->is_on) continue;

@@ -89,7 +89,7 @@ double steepest(const HeightMap& map) {
   return steepest;
 }
 
-/// A surface that is only told to be uneven no model has.
+/// No model has a surface that is only stated to be uneven.
 Effect decide_surface(const Gel& gel, const substrate::SubstrateParameters& p, const SceneSize& scene) {
   if (gel.surface) {
     return stage::decided(EffectKind::uneven_surface, Switch::automatic, kChangeBySlope * steepest(*gel.surface),

@@ -5,7 +5,7 @@
 
 namespace mbtfm::choice {
 
-/// What decides beside the gel itself; zero where there is no scene yet.
+/// What decides besides the gel itself; zero where there is no scene yet.
 struct SceneSize {
   double width_um = 0;            ///< diagonal of the rectangle around all adhesions and points
   double adhesion_radius_um = 0;  ///< mean over the adhesions of the radius of a disc of the same area

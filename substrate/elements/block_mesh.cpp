@@ -19,7 +19,7 @@ namespace mbtfm::elements {
 namespace {
 
 /// deal.II and the 150 libraries that it needs take 0.25 s of each start: they are loaded where a mesh is made, not
-/// with the program. The path is told by the program's, as sanitizers hide the run path from dlopen.
+/// with the program. The path follows from the program's, as sanitizers hide the run path from dlopen.
 MakeMesh* load_mesh_maker() {
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
   const std::filesystem::path file = program.parent_path().parent_path() / "lib/mbtfm" / kMeshMakerFile;

@@ -58,7 +58,7 @@ BlockMesh make_block_mesh(const GridLines& lines, const std::function<bool(const
 /// The cell that holds a point of a depth within the block; -1 beside the block.
 int cell_holding(const BlockMesh& mesh, const std::array<double, 3>& point_um);
 
-/// What `memory_limit_GB` stands for: 0 is four fifths of the machine's memory.
+/// What `memory_limit_GB` means: 0 is four fifths of the machine's memory.
 double allowed_GB(double memory_limit_GB);
 
 }  // namespace mbtfm::elements

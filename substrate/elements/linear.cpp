@@ -39,7 +39,7 @@ std::function<MatrixXd(int cell)> box_stiffness_of(const substrate::Material& ma
     const MatrixXd* unit;
     double factor;
   };
-  // where the modulus changes within them they are told apart by length and depth, too
+  // if the modulus changes within them, they also differ by length and depth
   std::map<std::array<long, 4>, MatrixXd> by_shape;
   std::vector<OfBox> of_boxes;
   for (const Box& box : mesh.cells) {

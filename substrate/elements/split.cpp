@@ -131,7 +131,7 @@ Footprint footprint_of(const Extent& scene, const Gel& gel, const substrate::Sub
   const Squares s = {below(scene.low_um.x), below(scene.high_um.x) + 1, below(scene.low_um.y),
                      below(scene.high_um.y) + 1};
   const double margin = substrate::margin_um(gel, parameters);
-  // the gel's own sides stand where they do; far ones may stand at whole squares, alike for many scenes
+  // the gel's own sides are where they are; far ones may be at whole squares, alike for many scenes
   const Extent from =
       parameters.side_distance_um ? scene : Extent{{s[0] * step, s[2] * step}, {s[1] * step, s[3] * step}};
   return {s, {from.low_um - Vec2{margin, margin}, from.high_um + Vec2{margin, margin}}};

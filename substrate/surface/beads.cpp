@@ -187,9 +187,9 @@ class Fitter {
       newton(rough, smoothing.stiffness, 0, 2);
       update_variances();
       const double before = smoothing.stiffness;
-      // MacKay's rule: coefficients that the data tell over what they are bent
-      const double told = std::max(0.5, at_.held - 3), bent = at_.coefficients_um.dot(rough.times(at_.coefficients_um));
-      smoothing.stiffness = std::clamp(told / std::max(bent, 1e-12), before / 10, before * 10);
+      // MacKay's rule: how many coefficients the data hold, over how much they are bent
+      const double held = std::max(0.5, at_.held - 3), bent = at_.coefficients_um.dot(rough.times(at_.coefficients_um));
+      smoothing.stiffness = std::clamp(held / std::max(bent, 1e-12), before / 10, before * 10);
       smoothing.stiffness = std::clamp(smoothing.stiffness, 1e-3, 1e6);
       const double reached = objective(with_gamma(rough, smoothing.stiffness), 0);
       if (std::abs(reached - last) < 1 && std::abs(std::log(smoothing.stiffness / before)) < 0.05) break;

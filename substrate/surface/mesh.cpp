@@ -141,7 +141,7 @@ class Sampler {
 
   void add(const Corners& t) {
     const double longest = longest_plan_edge(t), area = plan_area(t);
-    // a triangle that rounding can turn over stands upright
+    // a triangle that rounding can turn over is upright
     if (2 * std::abs(area) <= reach_um_ * longest) {
       refuse_jump(t, longest);
       return;

@@ -62,7 +62,7 @@ class PointFitter {
       const double stiffness = stiffness_, scale = scale_;
       const Band covariance = solve_once();
       update(covariance);
-      constexpr double kStill = 0.01;  // of its logarithm: far below what the evidence can tell
+      constexpr double kStill = 0.01;  // of its logarithm: far below what the evidence can resolve
       if (std::abs(std::log(stiffness_ / stiffness)) < kStill && std::abs(std::log(scale_ / scale)) < kStill) break;
       if (round + 1 == kMostRounds)
         throw NotSolved(
@@ -118,8 +118,8 @@ class PointFitter {
     // through points without errors it would go on falling: no less than a thousandth of the spread
     scale_ = std::max(scale_, given_.empty() ? 1e-3 * spread_um_ : 1.0);
     const double bent = coefficients_.dot(rough_.times(coefficients_));
-    const double told = std::max(0.5, held - 3);  // the three of a plane are not bent
-    stiffness_ = std::clamp(told / std::max(bent, 1e-12 * told), stiffness_ / 10, stiffness_ * 10);
+    const double known = std::max(0.5, held - 3);  // the three of a plane are not bent
+    stiffness_ = std::clamp(known / std::max(bent, 1e-12 * known), stiffness_ / 10, stiffness_ * 10);
     // beyond it a plane is a plane
     const double area = l_.side_um.x * l_.n_x * l_.side_um.y * l_.n_y;
     stiffness_ = std::min(stiffness_, 1e9 * area / (spread_um_ * spread_um_));

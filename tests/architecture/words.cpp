@@ -2,6 +2,7 @@
 /// an enumeration (pipeline/contract/words.h), which the compiler knows.
 #include <regex>
 
+#include "pipeline/files/text.h"
 #include "tests/support/folders.h"
 #include "tests/support/test.h"
 
@@ -33,11 +34,6 @@ const std::map<std::string, std::string> kReaders = {
 /// Paths, names of files, units of what a user types and the like: what no enumeration would make clearer.
 constexpr std::size_t kMostElsewhere = 10;
 
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 /// "file:line: the line" of each comparison with a text that is written out, on either side.
 std::vector<std::string> comparisons_in(const std::string& name, const std::string& text) {
   static const std::regex comparison(R"re([=!]=\s*"|"\s*[=!]=(?!=))re");
@@ -51,16 +47,20 @@ std::vector<std::string> comparisons_in(const std::string& name, const std::stri
   return found;
 }
 
+/// The text of each source of the product by its name.
+std::map<std::string, std::string> sources() {
+  std::map<std::string, std::string> found;
+  for (const char* top : {"pipeline", "segment", "network", "substrate", "continuum", "mbtfm", "samples"})
+    for (const auto& entry : fs::recursive_directory_iterator(kRoot / top))
+      if (const std::string extension = entry.path().extension(); extension == ".h" || extension == ".cpp")
+        found[fs::relative(entry.path(), kRoot).generic_string()] = files::read_text(entry.path());
+  return found;
+}
+
 std::map<std::string, std::vector<std::string>> comparisons() {
   std::map<std::string, std::vector<std::string>> found;
-  for (const char* top : {"pipeline", "segment", "network", "substrate", "continuum", "mbtfm", "samples"})
-    for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
-      const std::string extension = entry.path().extension();
-      if (extension != ".h" && extension != ".cpp") continue;
-      const std::string name = fs::relative(entry.path(), kRoot).generic_string();
-      const auto in_file = comparisons_in(name, text_of(entry.path()));
-      if (!in_file.empty()) found[name] = in_file;
-    }
+  for (const auto& [name, text] : sources())
+    if (const auto in_file = comparisons_in(name, text); !in_file.empty()) found[name] = in_file;
   return found;
 }
 
@@ -86,6 +86,18 @@ TEST(Words, are_compared_as_texts_in_readers_only) {
 TEST(Words, readers_that_are_excused_compare_texts) {
   const auto found = comparisons();
   for (const auto& [file, reason] : kReaders) EXPECT_TRUE(found.contains(file)) << file << ": " << reason;
+}
+
+TEST(Words, data_determine_show_and_report_but_do_not_tell) {
+  const std::regex quoted(R"re("(\\.|[^"\\])*")re"),
+      told(R"re((\b|_|k)(tells|[Tt]old)(\b|_)|//(?!/? @param tell ).*\btell\b)re");
+  for (const auto& [file, text] : sources()) {
+    if (std::regex_search(file, std::regex("^segment/(beads|cells|stacks)/"))) continue;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);)
+      if (line.find("tell") + 1 || line.find("told") + 1)
+        EXPECT_FALSE(std::regex_search(std::regex_replace(line, quoted, ""), told)) << file << ": " << line;
+  }
 }
 
 }  // namespace

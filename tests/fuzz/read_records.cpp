@@ -76,7 +76,7 @@ void read(std::string_view bytes) {
     is_json = true;
   });
   if (!is_json) return;
-  fuzz::answer([&] { runner::run_record_tells_of(run, options); });
+  fuzz::answer([&] { runner::run_record_is_complete(run, options); });
   fuzz::answer([&] { runner::verify_cell(run); });
   fuzz::answer([&] { runner::write_run_record(recorded, options, runner::look_at_cell(recorded, options)); });
   fuzz::answer([&] {

@@ -201,7 +201,7 @@ TEST(AdhesionPair, at_the_least_distance_four_in_five_experiments_tell_the_two_a
                                .noise_um = noise_um,
                                .half_field_um = 6 + 2 * distance_um};
     std::vector<char> told(kExperiments);
-    numerics::parallel_for(kExperiments, kThreads, [&](int draw) { told[draw] = test::is_told(pair, draw); });
+    numerics::parallel_for(kExperiments, kThreads, [&](int draw) { told[draw] = test::is_resolved(pair, draw); });
     // three standard deviations of a share of 400, and of the plan's own 400
     const double share = static_cast<double>(std::ranges::count(told, 1)) / kExperiments;
     EXPECT_NEAR(share, kChance, 3 * std::sqrt(2 * kChance * (1 - kChance) / kExperiments)) << noise_um;

@@ -79,7 +79,7 @@ TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
   TensionScene scene = test::scene_of(cell, tensions, 3000, 0.05, 1);
   const EnsembleFit fit = fit_own_network(scene);
   expect_sound(fit);
-  const std::vector<FibreGroup> groups = fibres_not_told_apart(fit);
+  const std::vector<FibreGroup> groups = fibres_not_distinguished(fit);
   ASSERT_EQ(groups.size(), 1u);
   EXPECT_EQ(groups[0].indices, (std::vector<int>{3, 4}));
   EXPECT_LE(std::abs(groups[0].sum_nN.value - 5), 4 * groups[0].sum_nN.noise);

@@ -55,14 +55,14 @@ inline double misfit_of_one(const FieldAt& field, double radius_um, const Eigen:
 }
 
 /// Whether beads tell two adhesions of 1 nN each apart. @param noise  that they have, over noise_um
-inline bool is_told(const FieldAt& field, double radius_um, double distance_um, int axis, double noise_um,
-                    const Eigen::VectorXd& noise) {
+inline bool is_resolved(const FieldAt& field, double radius_um, double distance_um, int axis, double noise_um,
+                        const Eigen::VectorXd& noise) {
   const Eigen::MatrixXd first = field({-0.5 * distance_um, 0}), second = field({0.5 * distance_um, 0});
   Eigen::MatrixXd both(first.rows(), first.cols() + second.cols());
   both << first, second;
   const Eigen::VectorXd u = first.col(axis) + second.col(axis) + noise_um * noise;
   return misfit_of_one(field, radius_um, u, distance_um) - misfit_of_forces(both, u) >
-         plan::kTold * noise_um * noise_um;
+         plan::kResolved * noise_um * noise_um;
 }
 
 /// Two adhesions that pull with 1 nN each, along their line or across it in turn.
@@ -73,7 +73,7 @@ struct DrawnPair {
 };
 
 /// Whether one drawn experiment tells the two apart.
-inline bool is_told(const DrawnPair& p, int draw) {
+inline bool is_resolved(const DrawnPair& p, int draw) {
   std::mt19937_64 random(static_cast<std::uint64_t>(draw) + 77);
   std::uniform_real_distribution<double> place(-p.half_field_um, p.half_field_um);
   std::normal_distribution<double> normal;
@@ -85,8 +85,8 @@ inline bool is_told(const DrawnPair& p, int draw) {
   }
   Eigen::VectorXd noise(2 * n);
   for (double& component : noise) component = normal(random);
-  return is_told([&](Vec2 at) { return pair_field(p.gel, at, p.radius_um, beads_um); }, p.radius_um, p.distance_um,
-                 draw % 2, p.noise_um, noise);
+  return is_resolved([&](Vec2 at) { return pair_field(p.gel, at, p.radius_um, beads_um); }, p.radius_um, p.distance_um,
+                     draw % 2, p.noise_um, noise);
 }
 
 /// The same with beads in a volume: forces along x, along y and into the gel in turn.
@@ -117,7 +117,7 @@ inline Eigen::MatrixXd pair_field_inside(const Gel& gel, Vec2 centre_um, double 
   return G;
 }
 
-inline bool is_told(const DrawnPairInSpace& p, int draw) {
+inline bool is_resolved(const DrawnPairInSpace& p, int draw) {
   std::mt19937_64 random(static_cast<std::uint64_t>(draw) + 77);
   std::uniform_real_distribution<double> place(-p.half_field_um, p.half_field_um), depth(0, p.volume.depth_um);
   std::normal_distribution<double> normal;
@@ -129,8 +129,8 @@ inline bool is_told(const DrawnPairInSpace& p, int draw) {
   }
   Eigen::VectorXd noise(3 * n);
   for (double& component : noise) component = normal(random);
-  return is_told([&](Vec2 at) { return pair_field_inside(p.gel, at, p.radius_um, beads_um, p.volume.axial_noise); },
-                 p.radius_um, p.distance_um, draw % 3, p.noise_um, noise);
+  return is_resolved([&](Vec2 at) { return pair_field_inside(p.gel, at, p.radius_um, beads_um, p.volume.axial_noise); },
+                     p.radius_um, p.distance_um, draw % 3, p.noise_um, noise);
 }
 
 }  // namespace mbtfm::test
