@@ -48,6 +48,16 @@ TEST(Fibres, are_followed_through_a_crossing_and_typed_by_their_adhesions) {
   }
 }
 
+TEST(Fibres, of_a_clipped_picture_are_those_of_the_whole_one) {
+  const std::vector<Polyline> lines = {{{4, 6}, {21, 19}}, {{4, 20}, {21, 8}}};
+  images::Image image = drawn(lines);
+  for (float& value : image.pixels) value = std::min(value, 190.0f);  // ground 100, crests 400: plateaus of 0.8 um
+  const auto fibres = fibres_of(image);
+  ASSERT_EQ(fibres.size(), lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) expect_traced(fibres[i], lines[i]);
+  for (const Fibre& f : fibres) EXPECT_NEAR(f.width_um, 0.63, 0.1);  // as of whole ones
+}
+
 TEST(Fibres, half_to_twice_as_wide_as_typical_are_found_with_their_width) {
   for (const double width_um : {0.3, 0.6, 1.2}) {
     SCOPED_TRACE(width_um);
