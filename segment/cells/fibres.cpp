@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "pipeline/contract/kinds_of_findings.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/cells/fibre_profile.h"
@@ -17,6 +18,7 @@
 #include "segment/cells/trace.h"
 #include "segment/cells/trace_join.h"
 #include "segment/cells/without_lines.h"
+#include "segment/images/channels.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -36,7 +38,8 @@ struct Crop {
   cv::Mat image;
   cv::Mat is_inside;  ///< CV_8U: of the cell's outline
   double pixel_um = 0;
-  Vec2 origin_um;  ///< outer corner of its first pixel
+  Vec2 origin_um;     ///< outer corner of its first pixel
+  cv::Mat is_seen{};  ///< CV_8U: of the outline, where the detector was not saturated
 
   Vec2 in_um(cv::Point2d point) const { return origin_um + to_um(point, pixel_um); }
 };
@@ -52,15 +55,22 @@ cv::Rect box_of(const Polygon& outline_um, cv::Size size, double pixel_um, doubl
   return box.empty() ? whole : box;
 }
 
-Crop field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
-  const cv::Rect box = box_of(outline_um, image.size(), pixel_um, 2 * p.fibre_averaging_um);
+Crop field_of(const images::Image& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
+  constexpr double kWidest = 4;  // widths: bundles that lie side by side are no ground
+  const cv::Rect box = box_of(outline_um, {image.width, image.height}, pixel_um, 2 * p.fibre_averaging_um);
+  const cv::Mat pixels = without_padding(matrix_of(image))(box);
+  cv::Mat is_clipped = cv::Mat::zeros(box.size(), CV_8U), is_seen;
+  if (noticed(Symptom::saturated, images::share_at_brightest(image)))
+    is_clipped = pixels == *std::ranges::max_element(image.pixels);
+  const cv::Mat whole = without_clipping(pixels, is_clipped, kWidest * p.fibre_width_um / pixel_um);
   const int factor = grid_factor(p, pixel_um);
-  Crop field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
+  Crop field{shrink(whole, factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
   field.is_inside = cv::Mat(field.image.size(), CV_8U, cv::Scalar(outline_um.empty() ? 255 : 0));
-  if (outline_um.empty()) return field;
   std::vector<std::vector<cv::Point>> corners(1);
   for (const Vec2 u : outline_um) corners[0].emplace_back(to_pixels(u - field.origin_um, field.pixel_um));
-  cv::fillPoly(field.is_inside, corners, cv::Scalar(255));
+  if (!outline_um.empty()) cv::fillPoly(field.is_inside, corners, cv::Scalar(255));
+  is_clipped.convertTo(is_seen, CV_32F);
+  field.is_seen = field.is_inside & (shrink(is_seen, factor) == 0);
   return field;
 }
 
@@ -116,7 +126,7 @@ TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ri
 cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, const Crop& field,
                        const FibreParameters& p) {
   const TextureLines texture = texture_lines_of(traces, ridges, field, p);
-  cv::Mat is_free = field.is_inside.clone();
+  cv::Mat is_free = field.is_seen.clone();
   const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
   for (const Trace& t : traces) {
     if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > most_false(p)) continue;
@@ -365,10 +375,10 @@ std::vector<Polyline> unexplained(const std::vector<Candidate>& fibres, const Ju
 
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& p) {
-  const Crop field = field_of(without_padding(matrix_of(image)), outline_um, pixel_size_um, p);
+  const Crop field = field_of(image, outline_um, pixel_size_um, p);
   const RidgeScales scales = scales_of(p, field.pixel_um);
   const TraceRule rule = rule_of(p, field.pixel_um);
-  Ridges ridges = find_ridges(field.image, field.is_inside, scales);
+  Ridges ridges = find_ridges(field.image, field.is_seen, scales);
   // what is bright enough in any texture is a fibre; the texture beside it tells what else is
   const cv::Mat is_free = free_of_fibres(trace_lines(ridges, field.is_inside, rule), ridges, field, p);
   set_noise(ridges, is_free, scales.noise_radius_px);

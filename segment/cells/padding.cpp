@@ -1,9 +1,11 @@
 #include "segment/cells/padding.h"
 
 #include <algorithm>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "pipeline/numerics/thin_plate.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -68,6 +70,31 @@ cv::Mat without_padding(const cv::Mat& image, const cv::Mat& padding) {
     for (int x = 0; x < image.cols; ++x)
       if (unsure.at<uchar>(y, x)) filled.at<float>(y, x) = value[labels.at<int>(y, x)];
   return filled;
+}
+
+cv::Mat without_clipping(const cv::Mat& image, const cv::Mat& is_clipped, double widest_px) {
+  const int n = cv::countNonZero(is_clipped);
+  if (n == 0 || n == static_cast<int>(image.total())) return image;
+  constexpr double kFaintest = 0.05;   // of the clipped height: the logarithm of less is noise
+  constexpr double kHighGround = 0.5;  // of the range: where bundles merge no ground is to be seen
+  const int factor = std::max(1, cvRound(widest_px / 8));
+  double darkest = 0, level = 0;
+  cv::minMaxLoc(image, &darkest, &level);
+  cv::Mat ground;
+  cv::morphologyEx(shrink(image, factor), ground, cv::MORPH_OPEN, disc_of(widest_px / factor));
+  cv::resize(cv::min(ground, darkest + kHighGround * (level - darkest)), ground, {}, factor, factor, cv::INTER_LINEAR);
+  ground = ground(cv::Rect({0, 0}, image.size()));
+  cv::Mat height = (image - ground) / (level - ground), relative, depth;
+  cv::log(cv::max(height, kFaintest), relative);
+  cv::distanceTransform(is_clipped, depth, cv::DIST_L2, 5);
+  relative.setTo(std::numeric_limits<float>::quiet_NaN(), is_clipped & (depth <= widest_px));
+  auto whole = numerics::plate_through({relative.begin<float>(), relative.end<float>()}, image.cols, 1, 1);
+  if (!whole) return image;
+  cv::Mat(image.size(), CV_64F, whole->data()).convertTo(relative, CV_32F);
+  cv::exp(cv::max(relative, 0), relative);
+  cv::Mat result = image.clone();
+  cv::Mat(ground + (level - ground).mul(relative)).copyTo(result, is_clipped);
+  return result;
 }
 
 }  // namespace mbtfm::cells

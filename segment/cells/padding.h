@@ -1,5 +1,5 @@
 /// The parts of an image that the microscope has not recorded: registration shifts and turns pictures, and leaves one
-/// value where nothing is. Internal to segment/ (OpenCV types).
+/// value where nothing is; a saturated detector leaves its largest one. Internal to segment/ (OpenCV types).
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -18,5 +18,12 @@ cv::Mat padding_in(const cv::Mat& image);
 /// The image with the nearest recorded pixel in each one of the padding.
 cv::Mat without_padding(const cv::Mat& image, const cv::Mat& padding);
 inline cv::Mat without_padding(const cv::Mat& image) { return without_padding(image, padding_in(image)); }
+
+/// The image with what may have been in its clipped pixels, which are lower bounds: the logarithm of the brightness
+/// over the ground goes on through a plateau as a plate of least bending energy. Of a clipped ridge of Gaussian profile
+/// that is the ridge: its logarithm is a parabola.
+/// @param is_clipped  CV_8U
+/// @param widest_px   half the width of what is no ground: what an opening by a disc of this radius takes off
+cv::Mat without_clipping(const cv::Mat& image, const cv::Mat& is_clipped, double widest_px);
 
 }  // namespace mbtfm::cells

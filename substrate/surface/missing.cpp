@@ -1,6 +1,5 @@
 #include "substrate/surface/missing.h"
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/thin_plate.h"
 
 namespace mbtfm::surface {
 namespace {
@@ -57,24 +57,6 @@ Hole widest_hole(const HeightMap& map) {
   return widest;
 }
 
-/// A second difference of heights that a plate's bending energy counts.
-struct Bend {
-  std::vector<std::pair<std::size_t, double>> terms;
-};
-
-void add_bends(const HeightMap& map, int i, int j, std::vector<Bend>& bends) {
-  const double dx = map.spacing_um.x, dy = map.spacing_um.y;
-  const auto at = [&](int a, int b) { return vertex_of(map, i + a, j + b); };
-  if (i > 0 && i + 1 < map.n_x)
-    bends.push_back({{{at(-1, 0), 1 / (dx * dx)}, {at(0, 0), -2 / (dx * dx)}, {at(1, 0), 1 / (dx * dx)}}});
-  if (j > 0 && j + 1 < map.n_y)
-    bends.push_back({{{at(0, -1), 1 / (dy * dy)}, {at(0, 0), -2 / (dy * dy)}, {at(0, 1), 1 / (dy * dy)}}});
-  if (i + 1 < map.n_x && j + 1 < map.n_y) {
-    const double twist = std::sqrt(2) / (dx * dy);
-    bends.push_back({{{at(0, 0), twist}, {at(1, 0), -twist}, {at(0, 1), -twist}, {at(1, 1), twist}}});
-  }
-}
-
 }  // namespace
 
 HeightMap binned(const HeightMap& map, int factor) {
@@ -108,13 +90,9 @@ HeightMap binned(const HeightMap& map, int factor) {
 }
 
 FilledMap filled(HeightMap map, double widest_um) {
-  std::vector<int> unknown(map.z_um.size(), -1);
-  int n = 0;
-  for (std::size_t k = 0; k < map.z_um.size(); ++k) {
-    if (std::isnan(map.z_um[k])) unknown[k] = n++;
-  }
+  const auto n = std::ranges::count_if(map.z_um, [](double z) { return std::isnan(z); });
   if (n == 0) return {std::move(map), 0};
-  if (n == static_cast<int>(map.z_um.size())) throw InvalidData("height map", "heights", "none");
+  if (n == std::ssize(map.z_um)) throw InvalidData("height map", "heights", "none");
   const Hole hole = widest_hole(map);
   if (hole.width_um > widest_um) {
     throw InvalidData("height map near x, y = " + brief(hole.middle_um.x) + ", " + brief(hole.middle_um.y) + " um",
@@ -122,36 +100,10 @@ FilledMap filled(HeightMap map, double widest_um) {
                           " um (largest_hole_um): cut the map to where it is whole (low_x_um …), or allow wider ones",
                       "none within " + brief(hole.width_um / 2) + " um");
   }
-  std::vector<Eigen::Triplet<double>> entries;
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
-  std::vector<Bend> bends;
-  for (int j = 0; j < map.n_y; ++j) {
-    for (int i = 0; i < map.n_x; ++i) {
-      bends.clear();
-      add_bends(map, i, j, bends);
-      for (const Bend& bend : bends) {
-        double known = 0;
-        for (const auto& [vertex, weight] : bend.terms) known += unknown[vertex] < 0 ? weight * map.z_um[vertex] : 0;
-        for (const auto& [row, weight] : bend.terms) {
-          if (unknown[row] < 0) continue;
-          right[unknown[row]] -= weight * known;
-          for (const auto& [column, other] : bend.terms) {
-            if (unknown[column] >= 0) entries.emplace_back(unknown[row], unknown[column], weight * other);
-          }
-        }
-      }
-    }
-  }
-  Eigen::SparseMatrix<double> matrix(n, n);
-  matrix.setFromTriplets(entries.begin(), entries.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
-  const Eigen::VectorXd z = factor.solve(right);
-  if (factor.info() != Eigen::Success || !z.allFinite())
-    throw InvalidData("height map", "holes among heights that hold a plate", "too few heights");
-  for (std::size_t k = 0; k < map.z_um.size(); ++k) {
-    if (unknown[k] >= 0) map.z_um[k] = z[unknown[k]];
-  }
-  return {std::move(map), n};
+  auto whole = numerics::plate_through(std::move(map.z_um), map.n_x, map.spacing_um.x, map.spacing_um.y);
+  if (!whole) throw InvalidData("height map", "holes among heights that hold a plate", "too few heights");
+  map.z_um = std::move(*whole);
+  return {std::move(map), static_cast<int>(n)};
 }
 
 }  // namespace mbtfm::surface
