@@ -83,9 +83,8 @@ struct CellInSpace {
     const auto n = static_cast<int>(cell.adhesions.size());
     forces = MatrixXd::Zero(3 * (n + 1), 3);
     for (int a = 0; a < n; ++a) {
-      constexpr double kTop_um = 5;
       const Vec2 d = nucleus.position_um - cell.adhesions[a].position_um;
-      const Eigen::Vector3d along = Eigen::Vector3d(d.x, d.y, -kTop_um).normalized();
+      const Eigen::Vector3d along = Eigen::Vector3d(d.x, d.y, -5).normalized();  // to its top, 5 um high
       forces.block<3, 1>(3 * a, a % 3) += along;
       forces.block<3, 1>(3 * n, a % 3) -= along;
     }
@@ -96,25 +95,23 @@ struct CellInSpace {
 
   /// By beads in a layer below the surface, as a stack shows them. @param false_um  of one bead, into the gel
   LinearData measured(unsigned seed, double false_um = 0) const {
-    constexpr int kBeads = 1500;
     constexpr double kNoise_um = 0.05;
     test::Normal normal(seed);
     std::vector<Vec3> beads;
     LinearData data{.has_errors = true, .dimension = 3};
-    for (int b = 0; b < kBeads; ++b) {
-      beads.push_back({30 + 8 * normal(), 30 + 8 * normal(), 0.2 + std::abs(normal())});
-      data.position_um.push_back({beads.back().x, beads.back().y});
-      data.height_um.push_back(-beads.back().z);
+    for (int b = 0; b < 1500; ++b) {
+      const Vec3 at{30 + 8 * normal(), 30 + 8 * normal(), 0.2 + std::abs(normal())};
+      beads.push_back(at), data.position_um.push_back({at.x, at.y}), data.height_um.push_back(-at.z);
     }
     const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 2);
-    const substrate::Loads loads{substrate::ellipses_of(cell.adhesions), 3};
-    data.response = gel->response(loads, {beads, substrate::Components::all})->kept();
+    data.response =
+        gel->response({substrate::ellipses_of(cell.adhesions), 3}, {beads, substrate::Components::all})->kept();
     data.displacement_um = data.response->displace(true_nN);
     for (double& u : data.displacement_um) u += kNoise_um * normal();
     data.displacement_um[2] += false_um;
     data.n_used = data.displacement_um.size();
     data.weight_per_um = VectorXd::Constant(data.n_used, 1 / kNoise_um);
-    return reweighted(std::move(data), VectorXd::Ones(kBeads));
+    return reweighted(std::move(data), VectorXd::Ones(1500));
   }
 
   /// Two networks that are not the truth.
