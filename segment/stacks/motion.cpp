@@ -342,10 +342,10 @@ CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, 
 
   const Means means = means_by_depth(beads, motion.z_um, motion.centre_um, fit);
   StageByDepth across = stage_by_depth(means.across, slice_drift != Switch::off && motion.z_um.size() > 2);
-  constexpr double kCertain = 3;
+  constexpr double kPays = 2;  // the gain is more than the stage's two variances cost: Akaike's criterion
   motion.slice_drift_ratio = std::sqrt(2 * across.log_likelihood_gain);
   motion.has_slice_drift =
-      slice_drift == Switch::on || (slice_drift == Switch::automatic && motion.slice_drift_ratio > kCertain);
+      slice_drift == Switch::on || (slice_drift == Switch::automatic && motion.slice_drift_ratio > kPays);
   for (Index k = 0; k < across.um.rows(); ++k) {
     motion.slices_um.push_back({across.drift_um(k, 0), across.drift_um(k, 1)});
     motion.slices_sigma_um.push_back(across.sigma_um[k]);

@@ -40,7 +40,7 @@ struct Slices {
 /// of the quietest third, so that up to two thirds may move. A bead's picture is about as long as two slices, so its
 /// place moves by what is linear between those of the slices; where beads are few, of every second one, and so on. How
 /// much of the mean at each depth is the stage's: stage_by_depth(). On `automatic` the drift belongs to the motion
-/// where the ratio is above 3.
+/// where the ratio is above 2.
 CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices);
 
 }  // namespace mbtfm::stacks
