@@ -89,14 +89,14 @@ TEST(Words, readers_that_are_excused_compare_texts) {
 }
 
 TEST(Words, data_determine_show_and_report_but_do_not_tell) {
-  const std::regex quoted(R"re("(\\.|[^"\\])*")re"),
-      told(R"re((\b|_|k)(tells|[Tt]old)(\b|_)|//(?!/? @param tell ).*\btell\b)re");
+  const std::regex quoted(R"("(\\.|[^"\\])*")"), told(R"((\b|_|k)(tells|[Tt]old)(\b|_)|//(?!/? @param t).*\btell\b)");
   for (const auto& [file, text] : sources()) {
     if (std::regex_search(file, std::regex("^segment/(beads|cells|stacks)/"))) continue;
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);)
-      if (line.find("tell") + 1 || line.find("told") + 1)
-        EXPECT_FALSE(std::regex_search(std::regex_replace(line, quoted, ""), told)) << file << ": " << line;
+      EXPECT_FALSE((line.find("tell") + 1 || line.find("told") + 1) &&
+                   std::regex_search(std::regex_replace(line, quoted, ""), told))
+          << file << ": " << line;
   }
 }
 
