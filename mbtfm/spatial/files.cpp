@@ -49,7 +49,7 @@ Shown shown(const Problem& problem, const SpatialReconstruction& r) {
         for (const VertexShare& b : shares)
           variance += a.share * b.share * r.covariance_kPa2(3 * a.vertex + c, 3 * b.vertex + c);
       }
-      double shortened = 0;  // group-l1's map, beside the mean of which the covariance is
+      double shortened = 0;  // the covariance is about the mean, which group-l1 shrinks
       if (r.method == tractions::TractionMethod::group_l1) {
         const VectorXd& mean = summed_tractions_kPa(r);
         for (const auto& [vertex, share] : shares)

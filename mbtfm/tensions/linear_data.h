@@ -36,10 +36,10 @@ struct Motions {
   MatrixXd shapes = {};     ///< M: 2·beads × motions
   VectorXd precision = {};  ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its size, in
                             ///< units of the noise's; 0 where nothing is known of it; empty: all 0
-  MatrixXd inverse = {};  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place show a turn as a shift. The covariance
-                          ///< of the sizes by noise of variance 1
-  MatrixXd forces = {};   ///< E: by motion, the forces of adhesions that it comes of, besides those found as forces;
-                          ///< 2·adhesions × motions; empty: none
+  MatrixXd inverse = {};    ///< (MᵀW²M + Λ)⁻¹, by rank: of beads in one place a turn is a shift. The covariance
+                            ///< of the sizes by noise of variance 1
+  MatrixXd forces = {};     ///< E: by motion, the forces of adhesions that it comes of, besides those found as forces;
+                            ///< 2·adhesions × motions; empty: none
 };
 
 /// These besides those: each stays what it is.

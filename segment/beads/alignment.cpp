@@ -16,7 +16,7 @@ constexpr double kDegree_rad = std::numbers::pi / 180;
 /// Half a step displaces a bead by its own width 300 px from the centre.
 constexpr double kStep_rad = 0.5 * kDegree_rad;
 constexpr int kSteps = 60;
-constexpr int kMostPixels = 512;  ///< a side: some thousand beads tell a turn
+constexpr int kMostPixels = 512;  ///< a side: some thousand beads show a turn
 
 /// The middle of the plane, made small where beads stay wider than 0.8 px.
 cv::Mat reduced(const Plane& plane, double factor) {

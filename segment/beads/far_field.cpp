@@ -206,7 +206,7 @@ void take_errors(FarField& far, const Solved& s, double scale) {
   far.linear_chi_squared = linear_chi_squared(s);
 }
 
-/// Beads in the squares at rest, about drift and tail. 1500 tell a standard deviation to a fiftieth.
+/// Beads in the squares at rest, about drift and tail. 1500 give a standard deviation to a fiftieth.
 void take_noise(FarField& far, const std::vector<Vec2>& positions, const std::vector<Vec2>& u,
                 const std::vector<char>& is_used, const Sources& sources, const VectorXd& forces) {
   constexpr int kMost = 1500;

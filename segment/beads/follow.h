@@ -75,7 +75,7 @@ int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& trac
 std::vector<double> missed_around(const Scene& scene, const std::vector<Track>& tracks,
                                   const std::vector<std::optional<LocalMotion>>& beside);
 
-/// The same of what beads do beside their expected motions (px), of which half of what the beads around do not tell
+/// The same of what beads do beside their expected motions (px), of which half of what the beads around do not show
 /// may be wrong.
 int flag_outliers_beside(const std::vector<Vec2>& expected, const Scene& scene, double threshold,
                          std::vector<Track>& tracks);

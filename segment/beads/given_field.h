@@ -47,7 +47,7 @@ GivenMotion take_motion_off(DisplacementField& field, const TrackParameters& par
 double outwardness(const DisplacementField& field);
 
 /// The gel moves outward, away from what is pushed, as if stressed and relaxed image were exchanged. Asked only where a
-/// picture can tell: a part of it is at rest, the border cuts no cell, and no growth is left in the field.
+/// picture can show it: a part of it is at rest, the border cuts no cell, and no growth is left in the field.
 /// @param is_affine_left  turn, growth or shear was found and not taken off
 bool points_outward(const DisplacementField& field, const CommonMotion& common, bool is_affine_left);
 

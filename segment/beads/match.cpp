@@ -10,7 +10,7 @@ namespace mbtfm::beads {
 namespace {
 
 constexpr double kLost = 0.4;        // p0: of the beads that no window finds so many are in one image only
-constexpr double kStranger = 0.05;   // so often a neighbour tells nothing of a bead: it may be wrong itself
+constexpr double kStranger = 0.05;   // so often a neighbour says nothing of a bead: it may be wrong itself
 constexpr double kMixedLight = 0.1;  // so often a spot has another bead's light, too
 constexpr double kStrain = 0.3;      // gels are seldom strained by more between two beads
 constexpr double kStrainLeft = 0.1;  // beside what forces on the adhesions explain

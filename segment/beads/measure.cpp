@@ -109,7 +109,7 @@ struct Dissimilarity {
   double median = 0;
   double noise = 0;      ///< standard deviation of a pixel
   double granted = 0.4;  ///< whatever the reason
-  /// What similarity a right match has depends on the noise, so the picture itself tells: a bead that is less similar
+  /// What similarity a right match has depends on the noise, so the picture itself sets it: a bead that is less similar
   /// by eight times the median lack of it shows another bead. Steep places cost similarity too: a tenth is granted.
   /// A dim bead lacks more, noise²/variance; it may lack half more than that. Of a bead `alone`, which any other may
   /// be taken for, twice as much is asked.

@@ -1,5 +1,5 @@
 /// Inside of the bead tracker: how far each bead has gone, whether that can be, which spot is which bead where windows
-/// cannot tell, what neighbours add, and how sharp and round beads are.
+/// cannot show, what neighbours add, and how sharp and round beads are.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,8 @@ void verify(const Scene& scene, std::vector<Track>& tracks);
 
 /// Where beads are loose, find again what no window found, or what its neighbours contradicted: matched with the spots
 /// that are left over (match.cpp), measured without the others' pictures, verified. Where motions are expected, beads
-/// whose neighbours do not tell them are matched anew, too: one whose spot is another's is moved, or flagged ambiguous.
+/// whose neighbours do not show them are matched again, too: one whose spot is another's is moved, or flagged
+/// ambiguous.
 /// @param expected  by bead, px: its motion, as far as it is known; empty: it is not
 void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks,
              const std::vector<Vec2>& expected = {});

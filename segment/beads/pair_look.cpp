@@ -169,7 +169,7 @@ double log_evidence(const std::vector<Vec2>& places, const VectorXd& u, const st
 
 std::string orientation_of_forces(const DisplacementField& field, const std::vector<Vec2>& adhesions_um,
                                   Vec2 middle_um) {
-  constexpr std::size_t kVectors = 600, kFewest = 100;  // enough to tell eight readings apart in a second
+  constexpr std::size_t kVectors = 600, kFewest = 100;  // enough to distinguish eight readings in a second
   // with up to half of the adhesions missing no other reading of 36 sound fields had more than 10; of fields that were
   // turned, with all adhesions, the right one had 23 or more
   constexpr double kSure = 15;

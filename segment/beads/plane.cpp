@@ -106,7 +106,7 @@ void in_strips(int n, int threads, const std::function<void(int, int)>& body) {
 double noise_of(const Plane& plane) {
   // Immerkaer's mask (CVIU 64:300, 1996), the difference of two Laplacians: blind to slopes and curvatures, norm 6
   std::vector<double> high;
-  // a quarter of a million pixels tell a quantile to 0.3 %
+  // a quarter of a million pixels give a quantile to 0.3 %
   const int step = 1 + static_cast<int>(std::sqrt(plane.values.size() / 2.5e5));
   for (int j = 1; j + 1 < plane.height; j += step) {
     const float *above = plane.row(j - 1), *here = plane.row(j), *below = plane.row(j + 1);
@@ -126,7 +126,7 @@ double bead_sigma_of(const Plane& plane) {
   const int side = std::min({64, plane.width - 2, plane.height - 2});
   std::vector<double> sigmas;
   if (side < 8) return 0;
-  // some 100 tiles tell the median to a few per cent, which is all a bead's width must be known to
+  // some 100 tiles give the median to a few per cent, which is all a bead's width must be known to
   const int step = side * std::max(1, static_cast<int>(std::sqrt(plane.values.size() / 1e2) / side));
   for (int top = 0; top + side + 2 <= plane.height; top += step) {
     for (int left = 0; left + side + 2 <= plane.width; left += step) {

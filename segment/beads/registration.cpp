@@ -316,7 +316,7 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
     if (!(now.gain > 0)) return result;
     const Vec6 change = inverse * (now.mismatch * (1 / now.gain) + prior * gradient_difference(result.motion, guess));
     const double shift = std::hypot(change[0], change[1]);
-    const double share = shift > 1 ? 1 / shift : 1;  // a slope tells nothing beyond a bead's flank
+    const double share = shift > 1 ? 1 / shift : 1;  // a slope shows nothing beyond a bead's flank
     result.motion = composed(result.motion, share * change);
     constexpr double kFarthest = 50;  // px; steps are of a pixel at most, but a gradient that runs off magnifies them
     if (!is_finite(result.motion.u) || norm(result.motion.u - guess.u) > kFarthest) {

@@ -254,7 +254,7 @@ Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads) 
                 .max_steps = 15,
                 .is_thinned = scene.bead_sigma() > 1.2,  // a chessboard, 1.4 px apart, does not see smaller beads whole
                 .settled_px = 0.02};
-  // 1.6 bead sigmas: four fifths of what a bead's flanks tell of its place, and little of its neighbours'
+  // 1.6 bead sigmas: four fifths of what a bead's flanks show of its place, and little of its neighbours'
   scene.narrow = {
       .sigma = 1.6 * scene.bead_sigma(), .gradient_sd = 0.15, .noise = 2 * noise, .max_steps = 15, .settled_px = 2e-3};
   return scene;

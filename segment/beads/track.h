@@ -65,7 +65,7 @@ struct TrackParameters {
   images::PlaneChoice relaxed_plane;
   int stressed_last = 0;                        ///< of a time series the last time or page; 0: a single image
   CellWith cell_with = CellWith::stressed;      ///< a cell is recorded with the beads that it pulls, then removed
-  TrackMethod method = TrackMethod::automatic;  ///< single beads know most where they can be told apart
+  TrackMethod method = TrackMethod::automatic;  ///< single beads know most where they are resolved
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
   /// A stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too.
@@ -169,7 +169,7 @@ struct ExchangedImages : InvalidData {
   using InvalidData::InvalidData;
 };
 
-/// What the good beads tell of the motion of all (um), a common motion beside: as of a gel that is pulled at known
+/// What the good beads show of the motion of all (um), a common motion beside: as of a gel that is pulled at known
 /// places.
 using FieldModel = std::function<std::vector<Vec2>(const DisplacementField& beads)>;
 

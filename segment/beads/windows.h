@@ -50,7 +50,7 @@ Windows windows_on(const Texture& relaxed, const Texture& stressed, double windo
 /// b is what a Gaussian window takes off a curved field, from second differences on the lattice. c compares the
 /// registrations' variances with what the lattice shows: the mask (1 −2 1)ᵀ(1 −2 1) over 3 x 3 windows is blind to
 /// polynomials up to x² and y² (Immerkaer, CVIU 64:300, 1996), so what it leaves is error, in the half of the picture
-/// where the field changes least. Nothing where too few windows are good to tell.
+/// where the field changes least. Nothing where too few windows are good.
 std::optional<Pooling> calibrated(const Windows& windows, const std::vector<Track>& tracks);
 
 }  // namespace mbtfm::beads

@@ -14,7 +14,7 @@ using One = EllipseSolver<1>;
 using Two = EllipseSolver<2>;
 
 /// Beyond the rim the window reaches this many deviations of the blur: where an ellipse's light has gone, and there is
-/// ground to tell.
+/// ground to decide.
 constexpr double kMargin = 3;
 constexpr int kRounds = 2;  // of neighbours taking each other's light off
 
@@ -174,7 +174,7 @@ struct LogBrightness {
 };
 
 /// Of the adhesions that are wide enough to show their brightness. A narrower one shows the product of brightness and
-/// area only; that it is about as bright as its neighbours is what tells the two apart.
+/// area only; that it is about as bright as its neighbours is what separates the two.
 std::optional<LogBrightness> common_brightness(const std::vector<FittedEllipse>& fitted) {
   std::vector<double> logarithms;
   for (const FittedEllipse& f : fitted)

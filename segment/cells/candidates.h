@@ -24,7 +24,7 @@ struct CandidateParameters {
   std::optional<AdhesionSource> adhesions =
       {};  ///< unset: as they are seen, if anything shows them; else on the whole cell's rim
   /// Beads lie some 1 um apart and a force's field falls off within its own size: forces nearer than two such
-  /// distances cannot be told apart.
+  /// distances cannot be separated.
   double candidate_spacing_um = 2;
   /// From the cell's edge inwards: nine of ten adhesions of a spread cell lie this near to it.
   double candidate_band_um = 6;

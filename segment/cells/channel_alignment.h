@@ -21,14 +21,14 @@ struct ChannelAlignment {
   double turn_sigma_rad = 0, growth_sigma = 0;
   /// Twice the gain of the log likelihood over images that lie on each other.
   double gain = 0;
-  int n_ends = 0;  ///< fibre ends that tell it
+  int n_ends = 0;  ///< fibre ends that show it
   Vec2 of(Vec2 actin_um) const;
   /// More than chance makes of images that lie on each other.
   bool is_significant() const;
 };
 
 /// A fibre pulls its adhesion along itself: the line on which it ends passes through the adhesion's centre. How far
-/// aside each end's line passes its adhesion tells the shift across it, and ends of all directions tell the whole.
+/// aside each end's line passes its adhesion shows the shift across it, and ends of all directions show the whole.
 ///
 /// Each end may belong to any adhesion near by, or to none: the likelihood of an offset d is
 /// (1 − π) N(d; 0, w) + π/2R, with half of the ends to be strays, w a quarter of the adhesions' median minor axis and R

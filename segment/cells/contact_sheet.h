@@ -20,7 +20,7 @@ struct SheetAxis {
 /// @throws UsageError where it is not written so, or has no or more than two axes, or more than 64 pictures
 std::vector<SheetAxis> parse_axes(const std::string& text);
 
-/// A segmentation for each pair of values of `parameters.contact_sheet`, drawn in columns and rows; a caption tells
+/// A segmentation for each pair of values of `parameters.contact_sheet`, drawn in columns and rows; a caption says
 /// what was found, or why nothing was.
 /// @param drawn  is used in all of them
 /// @throws UsageError where an axis names no parameter of the segmentation or a value is out of its range

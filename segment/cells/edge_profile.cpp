@@ -144,7 +144,7 @@ std::vector<int> cheapest_round(const std::vector<std::vector<double>>& cost) {
 }
 
 /// Minus the log-likelihood of each place, but for a constant: squared residuals over twice their variance, which the
-/// best places tell. A line must earn its two parameters (Akaike 1974), or noise would find one inside of every step.
+/// best places say. A line must earn its two parameters (Akaike 1974), or noise would find one inside of every step.
 std::vector<std::vector<double>> costs_of(const std::vector<std::vector<Residuals>>& residuals, std::size_t n_samples) {
   std::vector<double> least;
   for (const auto& row : residuals) {

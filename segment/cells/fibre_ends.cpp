@@ -240,7 +240,7 @@ void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const 
 }
 
 EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, double band_um, double lamellipodium_um) {
-  constexpr double kCourse_um = 2;  // of the line's end tells where it points
+  constexpr double kCourse_um = 2;  // of the line's end shows where it points
   constexpr double kInward = 0.5;   // cosine of 60°: pieces of other fibres point anywhere
   struct End {
     double to_edge_um = 0, outward = 0;  ///< cosine to the direction of the nearest edge
@@ -308,7 +308,7 @@ bool is_on_cut(Vec2 end, const Cuts& cuts) {
 
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
   if (cuts.empty()) return;
-  constexpr double kCourse_um = 1;  // of the line's end tells where it points
+  constexpr double kCourse_um = 1;  // of the line's end shows where it points
   const auto leads = [&](Polyline& line) {
     const Polyline last = last_part(line, kCourse_um);
     const Vec2 from = last.front(), ahead = direction_of_end(last);
@@ -336,7 +336,7 @@ void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
 namespace {
 
 /// Fibres that are held at both ends, wherever adhesions are seen: those that span the cell, and bundles along a free
-/// edge of which one end is held. A long line that nothing seems to hold is either or an arc, and its shape tells
+/// edge of which one end is held. A long line that nothing seems to hold is either or an arc, and its shape says
 /// which.
 bool is_held_at_both(const Fibre& fibre, const Polygon& outline_um, double lamellipodium_um) {
   const Polyline& line = fibre.points_um;

@@ -50,7 +50,7 @@ EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, do
 /// run across the nearest edge of the cell, arcs run along it, so the reach is longer for the former and shorter for
 /// the latter. Sets the type by the number of tied ends (Hotulainen & Lappalainen 2006), the chance that it is right,
 /// and the reason in words.
-/// @param outline_um  of the cell; empty: direction tells nothing
+/// @param outline_um  of the cell; empty: direction says nothing
 /// @param ends  the others stay as they are drawn, free
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
               EndsToTie ends = {});

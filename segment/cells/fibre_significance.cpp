@@ -54,7 +54,7 @@ double TextureLines::expected_beside(double significance) const {
 
 TextureLines texture_lines(std::vector<double> significances) {
   constexpr double kFewest = 10;
-  constexpr double kPrior = 30, kUsual = 2;  // a few lines do not tell the scale: as many of the usual one are added
+  constexpr double kPrior = 30, kUsual = 2;  // a few lines do not give the scale: as many of the usual one are added
   std::erase_if(significances, [](double s) { return s >= kHardlyTexture || s < kLeast; });
   const auto n = static_cast<double>(significances.size());
   if (significances.empty()) return {kFewest, kUsual};

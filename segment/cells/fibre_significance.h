@@ -1,4 +1,4 @@
-/// What tells a bundle from the meshwork of the cortex, and the lengths by which it is looked for. Internal to segment/
+/// What sets a bundle off the meshwork of the cortex, and the lengths by which it is looked for. Internal to segment/
 /// (OpenCV types).
 #pragma once
 
@@ -65,7 +65,7 @@ bool winds(const Polyline& line_um);
 /// How many pixels of the image become one of the grid: the narrow filter's deviation spans 1.2 of them, so that the
 /// grid carries all but 1e-3 of its spectrum.
 int grid_factor(const FibreParameters& parameters, double pixel_um);
-/// The filter is narrower than a fibre: it tells neighbours of a bundle apart, and still answers at the crest of a wide
+/// The filter is narrower than a fibre: it separates neighbours of a bundle, and still answers at the crest of a wide
 /// one.
 RidgeScales scales_of(const FibreParameters& parameters, double pixel_um);
 TraceRule rule_of(const FibreParameters& parameters, double pixel_um);

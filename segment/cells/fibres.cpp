@@ -237,7 +237,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
     heights.push_back(inner.back()->profile.height);
     ridge_heights.push_back(numerics::quantile(trace.height, 0.5));
   }
-  constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
+  constexpr std::size_t kEnough = 5;  // fewer do not show what bright and faint are
   constexpr double kHigh = 0.8;       // of the second highest of ten
   double faint = 0, bright = kAboveCortex * height_of_cortex(judge);
   if (heights.size() >= kEnough) {
@@ -379,7 +379,7 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   const RidgeScales scales = scales_of(p, field.pixel_um);
   const TraceRule rule = rule_of(p, field.pixel_um);
   Ridges ridges = find_ridges(field.image, field.is_seen, scales);
-  // what is bright enough in any texture is a fibre; the texture beside it tells what else is
+  // what is bright enough in any texture is a fibre; the texture beside it shows what else is
   const cv::Mat is_free = free_of_fibres(trace_lines(ridges, field.is_inside, rule), ridges, field, p);
   set_noise(ridges, is_free, scales.noise_radius_px);
   const auto traces = trace_lines(ridges, field.is_inside, rule);

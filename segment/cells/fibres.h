@@ -20,7 +20,7 @@ struct FibreParameters {
   double fibre_faintest = 0.25;          ///< fainter lines are filaments of the mesh, beside what the fibres carry
   double fibre_smallest_radius_um = 6;   ///< of curvature: bundles under tension are straight or gently curved
   double fibre_gap_um = 1.5;             ///< a bundle may be hidden by a crossing one for this long
-  double fibre_shortest_um = 3;          ///< shorter lines cannot be told from texture
+  double fibre_shortest_um = 3;          ///< shorter lines look like texture
   double fibre_edge_um = 1.0;            ///< a line along the outline this near to it is the cortex of the edge
   double fibre_lamellipodium_um = 3;     ///< its width: this near to the edge a line that winds is a ruffle
   double fibre_reach_um = 1.0;           ///< an end this near to an adhesion's rim is held by it

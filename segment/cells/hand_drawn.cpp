@@ -285,7 +285,7 @@ namespace {
 bool states_its_ends(const DrawnLine& line) { return line.stated && *line.stated != FibreType::unclassified; }
 
 /// Ends that may be tied. Of a dorsal fibre one: that which reaches an adhesion, as the program's own fibres are given
-/// back in either direction; its start where that does not tell.
+/// back in either direction; its start if that does not decide.
 EndsToTie ends_of(const DrawnLine& line, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
                   double reach_um) {
   if (!line.stated || n_held_ends(*line.stated) == 2) return {};

@@ -18,7 +18,7 @@ struct LabelMask {
   std::string name;
   int width = 0, height = 0;
   std::vector<int> labels;
-  bool is_binary = false;  ///< one value beside 0: parts are told apart by their place
+  bool is_binary = false;  ///< one value beside 0: parts are separated by their place
   int binning = 1;         ///< pixels of the mask a side of one of the images'
   std::string taken = {};  ///< which plane, if the file has several
   int at(int column, int row) const { return labels[static_cast<std::size_t>(row) * width + column]; }

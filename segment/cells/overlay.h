@@ -16,7 +16,7 @@ struct Colour {
   std::uint8_t red, green, blue;
 };
 
-// Those of the report's plots (Okabe & Ito's palette, which colour-blind people can tell apart), lighter for the dark
+// Those of the report's plots (Okabe & Ito's palette, which colour-blind people can separate), lighter for the dark
 // ground.
 inline constexpr Colour kVentralColour{0, 214, 143}, kDorsalColour{86, 180, 255}, kArcColour{255, 183, 40},
     kEdgeColour{255, 122, 82}, kUnclassifiedColour{184, 184, 184}, kAdhesionColour{255, 170, 235},
@@ -29,7 +29,7 @@ constexpr Colour colour_of(FibreType type) {
 
 /// The part of the images that holds the cell: actin in grey, adhesions in purple, both stretched to their own
 /// contrast; over them the outline, the adhesions' ellipses and the fibres in the colours that their types have in the
-/// report (Okabe & Ito's palette, which colour-blind people can tell apart), fainter the less sure ones, dashed the
+/// report (Okabe & Ito's palette, which colour-blind people can separate), fainter the less sure ones, dashed the
 /// lines that may be fibres, all fibre ids, and the adhesion ids that have room, the largest adhesions' first, dots on
 /// bright actin that is in no fibre; below a legend and a scale bar.
 images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,

@@ -271,11 +271,11 @@ std::vector<std::string> unused_in(const Inputs& in) {
   };
   if (d.outline && d.outline_mask) add(d.outline_mask->name, "the outline of " + d.outline->name + " counts");
   const bool is_seen = in.source == AdhesionSource::image;
-  const std::string as_told = "adhesions = " + std::string(name_of(in.source));
+  const std::string as_read = "adhesions = " + std::string(name_of(in.source));
   if (is_seen && d.adhesions && d.adhesion_mask)
     add(d.adhesion_mask->name, "the adhesions of " + d.adhesions->name + " count");
-  if (!is_seen && d.adhesions) add(d.adhesions->name, as_told);
-  if (!is_seen && in.source != AdhesionSource::pattern && d.adhesion_mask) add(d.adhesion_mask->name, as_told);
+  if (!is_seen && d.adhesions) add(d.adhesions->name, as_read);
+  if (!is_seen && in.source != AdhesionSource::pattern && d.adhesion_mask) add(d.adhesion_mask->name, as_read);
   return unused;
 }
 

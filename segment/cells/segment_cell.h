@@ -46,7 +46,7 @@ struct Segmentation {
   double reach_um = 0;                          ///< of an outline that was found, beyond its adhesions
   std::optional<double> outline_off_actin{};    ///< share of a given outline's area beyond them
   std::optional<double> bleed_through{};        ///< contrast of the fibres over that of the adhesions, in their image
-  std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
+  std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, if fibre ends show it
   std::vector<Polyline> unexplained_um{};       ///< actin as bright as the fibres that is in none of them
   std::vector<Polyline> doubtful_um{};          ///< lines that may be fibres and are less probable than these must be
   bool is_aligned = false;                      ///< fibres and outline were moved by it
@@ -64,7 +64,7 @@ struct Segmentation {
 /// @returns the cell that the parameters name, or all of them, the largest first
 /// @throws UsageError without any channel, where all cells are asked for and fibres are drawn by hand, or where the
 /// source of the adhesions is not there
-/// @throws InputError where sizes or calibrations contradict each other or none tells the pixel size; where a channel
+/// @throws InputError where sizes or calibrations contradict each other or none has the pixel size; where a channel
 /// is constant or saturated; where no cell, fewer cells than asked for, or in a given adhesion channel no adhesion is
 /// found
 std::vector<Segmentation> segment_cells(const std::optional<images::Channel>& adhesion,

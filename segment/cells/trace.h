@@ -36,11 +36,11 @@ struct TraceRule {
   double shortest_px = 15;
   double end_level = 0.5;        ///< a line ends where its height falls to this share of what it is before
   double end_window_px = 20;     ///< over this length
-  double course_px = 25;         ///< this length of an end tells where it points
+  double course_px = 25;         ///< this length of an end shows where it points
   double join_gap_px = 15;       ///< ends that point at each other from this far may be one line
   double overlap_px = 25;        ///< and ends that lie beside each other over this length
   double bridge_px = 90;         ///< longest gap between pieces of one fibre
-  double bridge_course_px = 60;  ///< of which so much of either end tells the course
+  double bridge_course_px = 60;  ///< of which so much of either end shows the course
   double bridge_misfit_px = 0.7;
   double bridge_radius_px = 500;
   double faint_px = 40;  ///< how far beyond its end a line may go on faintly

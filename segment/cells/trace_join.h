@@ -34,7 +34,7 @@ Parabola parabola_through(const std::vector<cv::Point2d>& a, const std::vector<c
 /// The points on the way over a gap, a pixel apart.
 Trace bridge_of(const Parabola& way, const Ridges& ridges);
 
-/// Pieces put together to lines, each end once and no line to a ring. How well ends fit is told by their turn, their
+/// Pieces put together to lines, each end once and no line to a ring. How well ends fit is judged by their turn, their
 /// offset, the gap between them, their heights, and by whether something bright lies in the gap; the best pair first.
 /// Candidates come from a grid of the ends: time grows with the number of pieces.
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule);

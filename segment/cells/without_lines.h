@@ -26,7 +26,7 @@ cv::Mat without_lines(const cv::Mat& image, const std::vector<SeenLine>& lines, 
 /// @param fibres       points about a pixel apart
 /// @param aside_px     crests nearer to a fibre are its own
 /// @param shortest_px  of a crest; shorter ones are specks
-/// @returns by crest its points, in no order; nothing of fewer than five fibres, which do not tell what bright is
+/// @returns by crest its points, in no order; nothing of fewer than five fibres, which do not show what bright is
 std::vector<std::vector<cv::Point2d>> bright_crests_beside(const Ridges& ridges, const cv::Mat& is_inside,
                                                            const std::vector<std::vector<cv::Point2d>>& fibres,
                                                            double aside_px, double shortest_px);

@@ -263,7 +263,7 @@ void drop_dimmest(std::vector<Spot>& spots, const std::vector<double>& least, in
   std::erase_if(spots, [&](const Spot& spot) { return spot.height < least[layer_of(spot.place.z, depth)]; });
 }
 
-/// No more than can be told apart: one in a ball of three widths.
+/// No more than can be resolved: one in a ball of three widths.
 void keep_highest(std::vector<Spot>& spots, const Volume& volume, Widths w) {
   constexpr double kBall = 4.0 / 3 * std::numbers::pi * 27;
   const double room = static_cast<double>(volume.values.size()) / (kBall * w.xy * w.xy * w.z);

@@ -23,7 +23,7 @@ struct CommonMotion {
   std::vector<double> slices_sigma_um;      ///< standard error of each component, with that of the shift
   std::vector<double> drift_sigma_um;       ///< without it
   double slice_drift_ratio = 0;             ///< square root of twice the gain in log likelihood by that drift
-  bool has_slice_drift = false;             ///< it is part of the motion; otherwise only told
+  bool has_slice_drift = false;             ///< it is part of the motion; otherwise only reported
   double share_at_rest = 0;                 ///< of the beads
 
   Vec3 at(Vec3 place_um) const;

@@ -298,7 +298,7 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
   const Read relaxed = beads::with_names(relaxed_file.string(), kRemedy, [&] {
     return read_and_detect(relaxed_file, track.relaxed_plane, "relaxed", track.detection_snr, nullptr, context);
   });
-  // what is missing is told before the longer half of the work
+  // what is missing is reported before the longer half of the work
   scale_of(relaxed.frame, relaxed.frame, track, parameters);
   tell(0.4, "finding beads of the stressed stack");
   const Read stressed = beads::with_names(stressed_file.string(), kRemedy, [&] {

@@ -1,4 +1,4 @@
-/// What mbtfm-track does with stacks: reads them, follows their beads, writes the files, reports and tells what they
+/// What mbtfm-track does with stacks: reads them, follows their beads, writes the files, reports and says what they
 /// show beside the displacement.
 #pragma once
 

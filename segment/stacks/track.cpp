@@ -30,7 +30,7 @@ void require_enough(std::size_t n, const char* which) {
                            "40 beads or more: twenty neighbours of each, and as many at rest", std::to_string(n));
 }
 
-/// How far beads are from what their neighbours tell: medians, so that what is wrong does not count. Strain that is no
+/// How far beads are from what their neighbours show: medians, so that what is wrong does not count. Strain that is no
 /// affine map counts there. The ratio is over what standard errors explain, of the differences between beads and the
 /// ones nearest to them, at no distance: the strain that the neighbours' affine map misses is the same for both there,
 /// their errors are not.

@@ -43,7 +43,7 @@ struct RigidMotion {
 struct Match {
   int partner = -1;  ///< in the stressed stack; -1: none
   TrackFlag flag = TrackFlag::no_partner;
-  Vec3 from_neighbours_um;              ///< displacement less that which the neighbours tell
+  Vec3 from_neighbours_um;              ///< displacement less that which the neighbours show
   double sigma_um = 0, sigma_z_um = 0;  ///< of that difference, by the standard errors of all of them
 };
 
@@ -108,14 +108,14 @@ struct Followed {
   RigidMotion first;
   double spacing_um = 0;  ///< mean distance of beads
   int n_good = 0, n_stressed = 0;
-  double neighbours_um = 0, neighbours_z_um = 0;  ///< how far beads are from what their neighbours tell, robust sd
+  double neighbours_um = 0, neighbours_z_um = 0;  ///< how far beads are from what their neighbours show, robust sd
   double error_ratio = 1,
          error_ratio_z = 1;  ///< that over what the pictures' errors explain; in each sigma where above 1
   double light_ratio = 0;    ///< of the stressed beads' light over the relaxed ones'; 0: not known
   std::map<std::string, int> flags;
 };
 
-/// Match, take off what is common, weigh the errors by what neighbours tell of them.
+/// Match, take off what is common, weigh the errors by what neighbours show of them.
 /// @throws beads::NotFollowed where there are too few beads, or the two stacks do not show the same
 Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
                 const MatchParameters& matching, Switch slice_drift, const Slices& slices, int threads);
