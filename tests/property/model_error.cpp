@@ -267,8 +267,8 @@ TEST(Discrepancy, balances_as_a_whole) {
   model.D -= sums * (sums.transpose() * sums).ldlt().solve(sums.transpose() * model.D);
   const std::vector<MeshForces> meshes(2, {model.D * model.tensions, model.D * model.tensions, model.D});
   const ReducedData data = model.data(2);
-  const Discrepancy beside =
-      discrepancy_of(data, mean_of(meshes), Eigen::VectorXd::Ones(4), model_error(meshes, data, 1), balance_of(centres_um), 1);
+  const Discrepancy beside = discrepancy_of(data, mean_of(meshes), Eigen::VectorXd::Ones(4),
+                                            model_error(meshes, data, 1), balance_of(centres_um), 1);
   const Eigen::VectorXd forces_nN = beside.forces.left * meshes.front().forces_nN + beside.forces.found_nN;
   EXPECT_GT((forces_nN - meshes.front().forces_nN).norm(), 0.1) << "nothing was found for this to tell anything";
   EXPECT_LT((sums.transpose() * forces_nN).cwiseAbs().maxCoeff(), 1e-8 * forces_nN.norm() * 100);
