@@ -12,7 +12,7 @@ namespace mbtfm {
 namespace {
 
 constexpr int kLinesOfProduct = 105320;
-constexpr int kLinesOfTests = 45610;
+constexpr int kLinesOfTests = 45622;
 constexpr int kLongSources = 11;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 570;                                               // lines
 constexpr int kOwnHeadersMedian = 17, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
