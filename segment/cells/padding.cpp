@@ -84,10 +84,12 @@ cv::Mat without_clipping(const cv::Mat& image, const cv::Mat& is_clipped, double
   cv::morphologyEx(shrink(image, factor), ground, cv::MORPH_OPEN, disc_of(widest_px / factor));
   cv::resize(cv::min(ground, darkest + kHighGround * (level - darkest)), ground, {}, factor, factor, cv::INTER_LINEAR);
   ground = ground(cv::Rect({0, 0}, image.size()));
-  cv::Mat height = (image - ground) / (level - ground), relative, depth;
+  cv::Mat height = (image - ground) / (level - ground), relative, depth, from_wide;
   cv::log(cv::max(height, kFaintest), relative);
+  // a plateau wider than any bundle is no ridge: a speck of dye or a dead cell has no crest to be found
   cv::distanceTransform(is_clipped, depth, cv::DIST_L2, 5);
-  relative.setTo(std::numeric_limits<float>::quiet_NaN(), is_clipped & (depth <= widest_px));
+  cv::distanceTransform(depth <= 0.5 * widest_px, from_wide, cv::DIST_L2, 5);
+  relative.setTo(std::numeric_limits<float>::quiet_NaN(), is_clipped & (from_wide > 0.5 * widest_px));
   auto whole = numerics::plate_through({relative.begin<float>(), relative.end<float>()}, image.cols, 1, 1);
   if (!whole) return image;
   cv::Mat(image.size(), CV_64F, whole->data()).convertTo(relative, CV_32F);

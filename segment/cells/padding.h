@@ -23,7 +23,9 @@ inline cv::Mat without_padding(const cv::Mat& image) { return without_padding(im
 /// over the ground goes on through a plateau as a plate of least bending energy. Of a clipped ridge of Gaussian profile
 /// that is the ridge: its logarithm is a parabola.
 /// @param is_clipped  CV_8U
-/// @param widest_px   half the width of what is no ground: what an opening by a disc of this radius takes off
+/// @param widest_px   half the width of what is no ground: what an opening by a disc of this radius takes off. A
+/// plateau
+///                    wider than this stays one: a speck of dye or a dead cell is no bundle
 cv::Mat without_clipping(const cv::Mat& image, const cv::Mat& is_clipped, double widest_px);
 
 }  // namespace mbtfm::cells

@@ -62,6 +62,19 @@ TEST(Fibres, of_a_clipped_picture_are_those_of_the_whole_one) {
   for (const Fibre& f : fibres) EXPECT_NEAR(f.width_um, 0.63, 0.1);  // as of whole ones
 }
 
+TEST(Fibres, are_not_made_of_a_saturated_blot) {
+  const std::vector<Polyline> lines = {{{4, 6}, {21, 19}}, {{4, 20}, {21, 8}}};
+  images::Image image = drawn(lines);
+  for (int k = 0; k < 256 * 256; ++k) {  // 7 um wide, above the fibres, with a soft rim
+    const double outside_px = std::hypot(k % 256 - 125, k / 256 - 45) - 35,
+                 blot = 600 / (1 + std::exp(outside_px / 1.2));
+    image.pixels[k] = static_cast<float>(std::min(image.pixels[k] + blot, 450.0));
+  }
+  const auto fibres = fibres_of(image);
+  EXPECT_EQ(fibres.size(), lines.size());
+  for (const Polyline& line : lines) EXPECT_TRUE(is_among(fibres, line, 0.1));
+}
+
 TEST(Fibres, half_to_twice_as_wide_as_typical_are_found_with_their_width) {
   for (const double width_um : {0.3, 0.6, 1.2}) {
     SCOPED_TRACE(width_um);
