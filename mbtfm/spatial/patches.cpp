@@ -43,7 +43,7 @@ Anywhere tractions_anywhere(const Problem& problem, int threads) {
 /// cube root makes normal (Wilson & Hilferty, PNAS 17 (1931) 684). Taken off before is what a field of the size of the
 /// gel's model error adds on the average, if tractions of variance one made it: that error is no noise.
 /// Source: Lin, Biometrika 84 (1997) 309.
-/// @param beside  the rows, with the patches as a block besides  @param degrees  of freedom that y has
+/// @param beside  the rows, with the patches as one more block  @param degrees  of freedom that y has
 double deviate_of_tractions_beside(const Problem& problem, const inverse::Rows& beside, const MatrixXd& anywhere,
                                    const VectorXd& weights_by_row, double degrees, int threads) {
   const VectorXd u = rows_of(problem, weights_by_row).of(problem.displacement_um());

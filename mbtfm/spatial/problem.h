@@ -34,7 +34,7 @@ struct Problem {
   MatrixXd patch_response_um_per_nN = {};   ///< to forces spread evenly over them, x, y, z of each in turn
   MatrixXd adhesion_areas_um2 = {};         ///< adhesions × vertices: the area of each, as weights of the vertices
   MatrixXd facet_response_um_per_kPa = {};  ///< to even tractions on the faces, where they are asked for
-  MatrixXd common_um = {};                  ///< what all beads may do together besides; no columns: nothing
+  MatrixXd common_um = {};                  ///< what all beads may do together, too; no columns: nothing
   double model_error = 0;                   ///< relative, of G, as the gel's model states it
   Figures figures = {};                     ///< of that model
 

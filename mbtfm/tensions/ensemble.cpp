@@ -310,7 +310,7 @@ void add_estimates(EnsembleFit& all, bool is_cut) {
   add_force_estimates(all, is_cut);
 }
 
-/// R + E a + E' a', the latter besides what the former make of the network's.
+/// R + E a + E' a', the latter added to what the former make of the network's.
 OwnForces one_after_the_other(const OwnForces& first, const OwnForces& then) {
   return {.left = numerics::small_product(then.left, first.left),
           .found_nN = numerics::plus_matvec(then.found_nN, then.left, first.found_nN),

@@ -42,7 +42,7 @@ struct Motions {
                             ///< 2·adhesions × motions; empty: none
 };
 
-/// These besides those: each stays what it is.
+/// Both together: each stays what it is.
 Motions joined(Motions those, const Motions& these);
 /// The same, ahead of the last of those.
 Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);
@@ -96,7 +96,7 @@ VectorXd moved_by(const LinearData& data, const VectorXd& forces_nN);
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
 /// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
 MatrixXd motion_in(const LinearData& data, const MatrixXd& displacements);
-/// Forces that adhesions have of their own, E a besides R: the a that explain best what R leaves. Linear in R, so
+/// Forces that adhesions have of their own, E a added to R: the a that explain best what R leaves. Linear in R, so
 /// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
 struct OwnForces {
   MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G: 2·adhesions square
