@@ -41,8 +41,8 @@ struct Adhesion {
 double area_stood_for_um2(const Adhesion& adhesion);
 
 /// Hotulainen & Lappalainen (2006): dorsal fibres end on an adhesion with one end, arcs with none, ventral with both.
-/// An edge fibre is held at both ends, too, and runs along a free piece of the outline. Unclassified: none of these
-/// four is as probable as not.
+/// An edge fibre is held at both ends, too, and runs along a free piece of the outline. Unclassified: the
+/// type that its ends show is less probable than not.
 enum class FibreType { dorsal, arc, ventral, edge, unclassified };
 constexpr auto words(FibreType) { return std::array{"dorsal", "arc", "ventral", "edge", "unclassified"}; }
 /// The first of its name, for labels: types are distinct without colour, too.
@@ -61,7 +61,7 @@ struct Fibre {
   double mean_intensity = 0;
   double confidence = 1;       ///< that it is a fibre, 0 to 1
   Polyline points_um;          ///< at least two, no two in a row equal
-  double type_confidence = 1;  ///< of the most probable of the four types, 0 to 1
+  double type_confidence = 1;  ///< chance of the type that its ends show, 0 to 1
   std::string type_reason{};   ///< in words; empty: none given
 };
 

@@ -1,10 +1,12 @@
 #include "segment/cells/fibre_ends.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "pipeline/contract/polyline.h"
 #include "segment/cells/candidates.h"
@@ -298,6 +300,23 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
     fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
     fibre.type_reason += "; fibres as long as this are usually held at both ends";
   }
+}
+
+void weigh_free_end(TracedFibre& traced, const Polygon& outline_um) {
+  constexpr std::array kCoefficients{-2.80, 4.70, 1.83, -0.96, -4.23};
+  Fibre& fibre = traced.fibre;
+  if (fibre.type != FibreType::dorsal || outline_um.empty()) return;
+  const bool is_first = !fibre.start_adhesion_id;
+  const WayOn& way = is_first ? traced.before : traced.after;
+  Vec2 free = fibre.points_um.front(), held = fibre.points_um.back();
+  if (!is_first) std::swap(free, held);
+  const double deeper_um = distance_to_boundary_um(outline_um, free) - distance_to_boundary_um(outline_um, held);
+  const double root = std::sqrt(std::max(traced.evidence.length_um, 1.0)),
+               brightness = std::log(std::max(traced.evidence.significance, 1.0) / root);
+  const double chance =
+      logistic({1, deeper_um / std::max(norm(free - held), 1e-9), brightness, way.beyond, way.goes_on}, kCoefficients);
+  fibre.type_confidence *= chance;
+  if (chance < 0.5) fibre.type_reason += "; its free end may be where the line was lost";
 }
 
 bool is_on_cut(Vec2 end, const Cuts& cuts) {

@@ -13,6 +13,8 @@ namespace mbtfm::cells {
 struct WayOn {
   Polyline points_um;              ///< from the end outwards
   std::vector<double> over_noise;  ///< by point, the ridge's height in standard deviations of the texture
+  double beyond = 0;               ///< mean of the same in the image without the fibres
+  double goes_on = 0;              ///< probability that another line is the same fibre's next piece
 };
 
 struct TracedFibre {
@@ -54,6 +56,11 @@ EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, do
 /// @param ends  the others stay as they are drawn, free
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
               EndsToTie ends = {});
+
+/// A dorsal fibre's free end may be where a ventral one was lost, and its type is as probable as the end is one. For it
+/// speaks an end deeper in the cell than the other one, a bright line, darkness beyond, and no other line that goes on.
+/// Logistic regression on simulated cells (notes/dense_fibres.md).
+void weigh_free_end(TracedFibre& traced, const Polygon& outline_um);
 
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.

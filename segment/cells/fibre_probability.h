@@ -24,6 +24,7 @@ struct FibreEvidence {
   double share_beside = 0;     ///< of its length that has a fibre beside it
   double cortex = 0;           ///< see cortex_along()
   double n_fibres = 0;         ///< of moderate significance in the cell
+  double significance = 0;     ///< grows with the root of the length
 };
 
 /// The probability, 0 to 1. Logistic regression on the lines of simulated cells: tests/studies/fibre_probability.py

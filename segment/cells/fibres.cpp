@@ -5,6 +5,7 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -314,7 +315,8 @@ class Surroundings {
             .relative_height = usual_height_ > 0 ? c.profile.height / usual_height_ : 1,
             .share_beside = bundles_.share_beside(c.points_um, own),
             .cortex = cortex_along(c.points_um, judge.outline_um),
-            .n_fibres = n_moderate_};
+            .n_fibres = n_moderate_,
+            .significance = c.significance};
   }
 
  private:
@@ -349,6 +351,25 @@ std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest
     if (!keep(line.trace))
       for (const std::size_t i : line.pieces) keep(traces[i]);
   return result;
+}
+
+/// What their ends show of whether they are the fibres' own.
+void look_beyond(std::vector<Candidate>& fibres, const Rest& rest, const TraceRule& rule) {
+  std::vector<Trace> smooth;
+  for (const Candidate& c : fibres) {
+    smooth.push_back(c.trace);
+    std::ranges::transform(c.points_um, smooth.back().points.begin(),
+                           [&](Vec2 u) { return to_pixels(u - rest.field.origin_um, rest.field.pixel_um); });
+  }
+  const std::vector<double> goes_on = chances_of_going_on(smooth, rule);
+  for (std::size_t e = 0; e < goes_on.size(); ++e) {
+    const bool is_first = e % 2 == 0;
+    WayOn& way = is_first ? fibres[e / 2].before : fibres[e / 2].after;
+    const auto noise =
+        faint_end(rest.ridges, rule, fibres[e / 2].trace, is_first ? LineEnd::first : LineEnd::last).over_noise;
+    way.beyond = std::accumulate(noise.begin(), noise.end(), 0.0) / std::max(1.0, static_cast<double>(noise.size()));
+    way.goes_on = goes_on[e];
+  }
 }
 
 /// Actin as bright as these fibres, away from them and from the folds at the cell's edge.
@@ -389,8 +410,9 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
     const Rest rest = rest_of(lines.fibres, judge);
     lines = with_probable(with_hidden(std::move(lines.fibres), rest, judge), judge);
     lines.fibres = regrouped(std::move(lines.fibres), rest, judge);
+    lines = with_probable(std::move(lines), judge);
+    look_beyond(lines.fibres, rest, rule);
   }
-  lines = with_probable(std::move(lines), judge);
   TracedLines traced{{}, {}, unexplained(lines.fibres, judge)};
   const Surroundings around(lines.fibres);
   for (const bool is_one : {true, false}) {
@@ -416,6 +438,7 @@ std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhes
   for (TracedFibre& t : traced) {
     lead_on(t, adhesions, outline_um, p.fibre_reach_um);
     tie_ends(t.fibre, adhesions, outline_um, p.fibre_reach_um);
+    weigh_free_end(t, outline_um);
     lead_to_cut(t.fibre, cuts, p.fibre_reach_um);
     fibres.push_back(std::move(t.fibre));
   }

@@ -48,12 +48,7 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
                         const Polygon& outline_um, const FibreParameters& parameters, const Cuts& cuts = {});
 
-/// Both: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
-/// collinear pieces joined. A line is a fibre if it is one with `fibre_least_probability` (probability_of()); steps
-/// (the cell's edge) and folds near the edge are left out. Ends are tied to the adhesions they reach, and their number
-/// is the type (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006), with its chance to be right and its reason.
-///
-/// A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
+/// Both. A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
 /// `mean_intensity` the mean height above both sides in grey levels.
 std::vector<Fibre> find_fibres(const images::Image& image, const Polygon& outline_um,
                                const std::vector<Adhesion>& adhesions, double pixel_size_um,

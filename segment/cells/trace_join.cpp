@@ -1,11 +1,13 @@
 #include "segment/cells/trace_join.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <tuple>
 
+#include "segment/cells/fibre_probability.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/squares.h"
 
@@ -63,17 +65,21 @@ End opposite(End end) { return end ^ 1; }
 
 struct EndPoint {
   cv::Point2d point, outward;
-  double height = 0;                   ///< mean of the last part
-  std::vector<cv::Point2d> part = {};  ///< from the end inwards
+  double height = 0;              ///< mean of the last part
+  std::vector<cv::Point2d> part;  ///< from the end inwards
 };
 
-std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, double reach_px) {
+std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, const TraceRule& rule) {
   std::vector<EndPoint> ends;
   for (const Trace& t : traces) {
-    const auto n = static_cast<std::ptrdiff_t>(std::min<double>(static_cast<double>(t.height.size()), 4 * reach_px));
-    const auto mean = [n](auto from) { return std::accumulate(from, from + n, 0.0) / static_cast<double>(n); };
-    ends.push_back({t.points.front(), outward(t.points, LineEnd::first, reach_px), mean(t.height.begin())});
-    ends.push_back({t.points.back(), outward(t.points, LineEnd::last, reach_px), mean(t.height.rbegin())});
+    const auto n = std::min(static_cast<std::ptrdiff_t>(t.size()), static_cast<std::ptrdiff_t>(4 * rule.course_px));
+    const auto add = [&](LineEnd end, cv::Point2d point, auto height) {
+      ends.push_back({point, outward(t.points, end, rule.course_px),
+                      std::accumulate(height, height + n, 0.0) / static_cast<double>(n),
+                      last_part(t, end, rule.bridge_course_px)});
+    };
+    add(LineEnd::first, t.points.front(), t.height.begin());
+    add(LineEnd::last, t.points.back(), t.height.rbegin());
   }
   return ends;
 }
@@ -145,6 +151,20 @@ std::optional<double> mismatch_across(const EndPoint& a, const EndPoint& b, cons
   const double bright = over_noise_between(way, ridges), far = gap / rule.bridge_px;
   const double mismatch = (misfit * misfit + bend * bend + far * far + height * height) / bright;
   return bright >= kBrighter && mismatch <= kWorst ? std::optional(mismatch) : std::nullopt;
+}
+
+/// How probable it is that two ends are of one fibre.
+double chance_of_one_fibre(const EndPoint& a, const EndPoint& b, const TraceRule& rule) {
+  constexpr double kTurn = 0.5;                           // rad, as above
+  constexpr double kLeastMisfit = 0.4, kLeastBend = 0.3;  // of those that bridged() allows: less says no more
+  constexpr std::array kCoefficients{1.67, -2.54, -1.23, -1.86, -1.78};
+  if (angle_between(a.outward, -b.outward) > kTurn) return 0;
+  const Parabola way = parabola_through(a.part, b.part);
+  const double gap = (way.to - way.from) / rule.bridge_px, height = std::abs(std::log(a.height / b.height));
+  if (gap < -0.3 || !std::isfinite(height)) return 0;
+  return logistic({1, std::log(std::max(way.misfit_px / rule.bridge_misfit_px, kLeastMisfit)),
+                   std::log(std::max(way.curvature() * rule.bridge_radius_px, kLeastBend)), std::max(gap, 0.0), height},
+                  kCoefficients);
 }
 
 struct Fit {
@@ -228,7 +248,7 @@ Trace entered(Trace piece, End entry) {
 }  // namespace
 
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
-  const auto ends = ends_of(traces, rule.course_px);
+  const auto ends = ends_of(traces, rule);
   const auto fits =
       fits_of(ends, rule.join_gap_px, [&](End a, End b) { return mismatch(ends[a], ends[b], ridges, rule); });
   std::vector<Trace> result;
@@ -240,10 +260,17 @@ std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const
   return result;
 }
 
+std::vector<double> chances_of_going_on(const std::vector<Trace>& fibres, const TraceRule& rule) {
+  const auto ends = ends_of(fibres, rule);
+  std::vector<double> chances(ends.size());
+  const auto chance = [&](End a, End b) { return std::optional(chance_of_one_fibre(ends[a], ends[b], rule)); };
+  for (const Fit& fit : fits_of(ends, 2 * rule.bridge_px, chance))  // the best come last
+    chances[fit.a] = chances[fit.b] = fit.mismatch;
+  return chances;
+}
+
 std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule) {
-  auto ends = ends_of(fibres, rule.course_px);
-  for (End e = 0; e < ends.size(); ++e)
-    ends[e].part = last_part(fibres[e / 2], e % 2 == 0 ? LineEnd::first : LineEnd::last, rule.bridge_course_px);
+  const auto ends = ends_of(fibres, rule);
   const auto fits =
       fits_of(ends, rule.bridge_px, [&](End a, End b) { return mismatch_across(ends[a], ends[b], ridges, rule); });
   std::vector<BridgedLine> result;

@@ -50,6 +50,10 @@ struct BridgedLine {
 /// @param ridges  of the image without these fibres: what is bright in a gap is no neighbour
 std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule);
 
+/// By end, the first of each line before its last, how probable it is that the line goes on as another one: that of the
+/// best partner, by logistic regression on simulated cells (notes/dense_fibres.md).
+std::vector<double> chances_of_going_on(const std::vector<Trace>& fibres, const TraceRule& rule);
+
 /// Where lines cross at a small angle one may be led on over the other's course, and the other ends there. A line that
 /// ends on another one gets back the part of it that lies on its own course: if both together lie on a slightly bent
 /// parabola, and the other one's two parts do not. What is left of the other one ends there.

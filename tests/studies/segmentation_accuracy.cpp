@@ -127,9 +127,8 @@ int main(int argc, char** argv) {
   const bool has_true_adhesions = argc > 4 && std::string(argv[4]) == "true-adhesions";
   const std::vector<std::string> settings(argv + std::min(argc, has_true_adhesions ? 5 : 4), argv + argc);
   std::map<std::string, std::map<std::string, double>> table;
-  Calibration calibration;
-  const std::vector<std::string> qualities = {"poor", "ordinary", "good"};
-  for (const std::string& quality : qualities) {
+  std::map<std::string, Calibration> calibrations;
+  for (const std::string quality : {"poor", "ordinary", "good"})
     for (int seed = first; seed <= last; ++seed) {
       const SimulatedCell cell = simulated_cell(scenario, quality, static_cast<std::uint64_t>(seed));
       Cell found;
@@ -147,14 +146,17 @@ int main(int argc, char** argv) {
       } catch (const InputError& error) {
         std::fprintf(stderr, "%s seed %d: %s\n", quality.c_str(), seed, error.what());
       }
-      for (const Fibre& f : found.fibres) calibration.add(f.confidence, is_true_fibre(f, cell.truth.fibres, 0.4));
+      for (const Fibre& f : found.fibres) {
+        calibrations["fibres"].add(f.confidence, is_true_fibre(f, cell.truth.fibres, 0.4));
+        if (const Fibre* t = true_fibre(f, cell.truth.fibres, 0.4))
+          calibrations["the type " + std::string(name_of(f.type))].add(f.type_confidence, f.type == t->type);
+      }
       for (const auto& [name, value] : accuracy_of(cell.truth, found))
         table[name][quality] += value / (last - first + 1);
     }
-  }
   std::printf("%-42s %9s %9s %9s   (%s, seeds %d to %d)\n", "", "poor", "ordinary", "good", scenario.c_str(), first,
               last);
   for (auto& [name, row] : table)
     std::printf("%-42s %9.3f %9.3f %9.3f\n", name.c_str(), row["poor"], row["ordinary"], row["good"]);
-  calibration.print("fibres");
+  for (const auto& [what, calibration] : calibrations) calibration.print(what.c_str());
 }

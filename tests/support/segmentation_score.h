@@ -132,6 +132,13 @@ inline bool is_true_fibre(const Fibre& found, const std::vector<Fibre>& truth, d
   return 2 * covered_share(std::vector{found}, truth, tolerance_um) >= 1;
 }
 
+/// The true one that most of it lies on; none if that is less than half.
+inline const Fibre* true_fibre(const Fibre& found, const std::vector<Fibre>& truth, double tolerance_um) {
+  const auto share = [&](const Fibre& t) { return covered_share(found.points_um, t.points_um, tolerance_um); };
+  const auto best = std::ranges::max_element(truth, {}, share);
+  return best != truth.end() && share(*best) >= 0.5 ? &*best : nullptr;
+}
+
 inline LineScore score_lines(const std::vector<Fibre>& truth, const std::vector<Fibre>& found, double tolerance_um) {
   return {covered_share(truth, found, tolerance_um), covered_share(found, truth, tolerance_um)};
 }
@@ -142,9 +149,7 @@ struct FibreScore {
   int n_unclassified = 0;  ///< … and has no type
   int n_type_right = 0;    ///< … and has the type
   int n_typed = 0;         ///< … and is held by the very adhesions
-  int n_found = 0;
-  int n_false = 0;            ///< found, and less than half of it near any true fibre
-  std::vector<int> found_id;  ///< by true fibre; 0: none
+  int n_false = 0;         ///< found, and less than half of it near any true fibre
 };
 
 /// @param adhesions  of score_adhesions, to translate the ids at the ends
@@ -157,9 +162,7 @@ inline FibreScore score_fibres(const Cell& truth, const Cell& found, const Adhes
     return 0;
   };
   FibreScore s;
-  s.n_found = static_cast<int>(found.fibres.size());
   for (const Fibre& t : truth.fibres) {
-    s.found_id.push_back(0);
     if (length_um(t.points_um) <= 4) continue;
     ++s.n_true;
     for (const Fibre& f : found.fibres) {
@@ -170,10 +173,7 @@ inline FibreScore score_fibres(const Cell& truth, const Cell& found, const Adhes
       s.n_type_right += t.type == f.type;
       const int a = translated(t.start_adhesion_id), b = translated(t.end_adhesion_id);
       const int c = f.start_adhesion_id.value_or(0), d = f.end_adhesion_id.value_or(0);
-      if (t.type == f.type && ((a == c && b == d) || (a == d && b == c))) {
-        ++s.n_typed;
-        s.found_id.back() = f.fibre_id;
-      }
+      s.n_typed += t.type == f.type && ((a == c && b == d) || (a == d && b == c));
       break;
     }
   }
