@@ -57,9 +57,9 @@ EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, do
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
               EndsToTie ends = {});
 
-/// A dorsal fibre's free end may be where a ventral one was lost, and its type is as probable as the end is one. For it
-/// speaks an end deeper in the cell than the other one, a bright line, darkness beyond, and no other line that goes on.
-/// Logistic regression on simulated cells (notes/dense_fibres.md).
+/// A dorsal fibre's free end may be where a ventral one was lost, and its type is as probable as the end is real: by
+/// its depth in the cell, the line's brightness, darkness beyond it, and whether another line goes on. Logistic
+/// regression on simulated cells (notes/dense_fibres.md).
 void weigh_free_end(TracedFibre& traced, const Polygon& outline_um);
 
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
