@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "mbtfm/inverse/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
+#include "substrate/compliance.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::tensions {
 
@@ -103,6 +106,30 @@ ReducedData reduced_by(const LinearData& data, const VectorXd& weight, Root C) {
 Index n_unexpected(const Motions& motions) { return motions.shapes.cols() - (motions.precision.array() > 0).count(); }
 
 }  // namespace
+
+Vec3 place_of_bead(const LinearData& data, Index bead) {
+  const auto& [x, y] = data.position_um[bead];
+  return {x, y, data.height_um.empty() ? 0 : -data.height_um[bead]};
+}
+
+substrate::Observations observed_at(const LinearData& data, const std::vector<Index>& beads) {
+  std::vector<Vec2> along;
+  std::vector<Vec3> in_space;
+  for (const Index b : beads) along.push_back(data.position_um[b]), in_space.push_back(place_of_bead(data, b));
+  if (data.dimension == 2) return {along};
+  return {in_space, substrate::Components::all};
+}
+
+substrate::Observations observed_at(const LinearData& data) {
+  std::vector<Index> all(data.position_um.size());
+  std::iota(all.begin(), all.end(), 0);
+  return observed_at(data, all);
+}
+
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const substrate::Observations& at,
+                                    const substrate::Substrate& gel) {
+  return gel.response({ellipses, static_cast<int>(at.n_components())}, at);
+}
 
 LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN, const std::vector<bool>& is_used) {
   return reduce(beads, substrate::dense_response(std::move(compliance_um_per_nN)), is_used);

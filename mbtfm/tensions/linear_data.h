@@ -14,7 +14,16 @@
 #include "pipeline/contract/geometry.h"
 #include "substrate/response.h"
 
+namespace mbtfm::substrate {
+class Substrate;      // see compliance.h
+struct Observations;  // see loads.h
+}  // namespace mbtfm::substrate
+
 namespace mbtfm::tensions {
+
+/// Of so many components as `dimension` has: a force, a displacement, a way; and what maps one to another.
+using ShortVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
+using ShortMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
 /// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best (and what
 /// is expected of their sizes counts: aᵀΛa is part of the left side).
@@ -63,6 +72,15 @@ struct LinearData {
   Index dimension = 2;      ///< components of a force, and of a bead's displacement
   ReducedData reduced;      ///< of all that, bead_weight included
 };
+
+/// In space, z into the gel.
+Vec3 place_of_bead(const LinearData& data, Index bead);
+/// What is observed of the gel at these beads, and at all.
+substrate::Observations observed_at(const LinearData& data, const std::vector<Index>& beads);
+substrate::Observations observed_at(const LinearData& data);
+/// How these points answer to forces on the ellipses, by a model of the gel, which must outlive it.
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const substrate::Observations& at,
+                                    const substrate::Substrate& gel);
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
 /// @param response  2·beads × 2·adhesions

@@ -41,7 +41,6 @@ struct Fitted {
                          .data = fit.data,
                          .networks = networks,
                          .cell = cell,
-                         .beads = scene.beads,
                          .gel = gel,
                          .substrate_error = substrate_error,
                          .lacks_base = lacks_base,
@@ -85,14 +84,8 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
   for (std::uint64_t seed = 11; seed < 15; ++seed)
     networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2);
-  const ErrorBudget budget = error_budget({.fit = fit,
-                                           .data = fit.data,
-                                           .networks = networks,
-                                           .cell = cell,
-                                           .beads = scene.beads,
-                                           .gel = test::kGel,
-                                           .segmentation = kExact},
-                                          2);
+  const ErrorBudget budget = error_budget(
+      {.fit = fit, .data = fit.data, .networks = networks, .cell = cell, .gel = test::kGel, .segmentation = kExact}, 2);
   for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
     const ErrorParts& parts = budget.tensions[i].parts_nN;
     EXPECT_NEAR(parts.beads, fit.tensions.nN[i].noise, 1e-9 * parts.beads) << i;
@@ -201,7 +194,6 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
                                              .data = early.fit.data,
                                              .networks = early.networks,
                                              .cell = cell,
-                                             .beads = early.scene.beads,
                                              .gel = test::kGel,
                                              .segmentation = kExact},
                                             2);
