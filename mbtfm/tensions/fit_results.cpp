@@ -141,8 +141,7 @@ double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
 FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
                       const FitParameters& parameters) {
   const Polygon& outline_um = scene.cell.outline_um;
-  const NoiseLevel noise =
-      noise_level(scene.beads, fit.data, adhesion_forces_nN(fit), outline_um, parameters.far_distance_um);
+  const NoiseLevel noise = noise_level(fit.data, adhesion_forces_nN(fit), outline_um, parameters.far_distance_um);
   const Imbalance balance = imbalance_of(fit);
   const VectorXd exerted_nN = adhesion_forces_nN(fit), beside_nN = exerted_nN - fit.forces.nN;
   FitSummary s;
@@ -316,32 +315,29 @@ bool is_far(Vec2 bead_um, const Polygon& outline_um, double far_distance_um) {
   return !contains(outline_um, bead_um) && distance_to_boundary_um(outline_um, bead_um) >= far_distance_um;
 }
 
-/// What lies beside another cell is no witness of rest.
-bool is_used(const LinearData& data, std::size_t bead) { return data.weight_per_um[2 * static_cast<Index>(bead)] > 0; }
-
 }  // namespace
 
 bool has_far_beads(const LinearData& data, const Polygon& outline_um, double far_distance_um) {
   constexpr int kFewest = 30;
   int n = 0;
-  for (std::size_t b = 0; b < data.position_um.size(); ++b)
+  for (Index b = 0; b < std::ssize(data.position_um); ++b)
     n += is_used(data, b) && is_far(data.position_um[b], outline_um, far_distance_um);
   return n >= kFewest;
 }
 
-NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const VectorXd& forces_nN,
-                       const Polygon& outline_um, double far_distance_um) {
-  const VectorXd residual = residual_um(data, forces_nN);
+NoiseLevel noise_level(const LinearData& data, const VectorXd& forces_nN, const Polygon& outline_um,
+                       double far_distance_um) {
+  const VectorXd residual = evened_residual_um(data, forces_nN);
+  const Index each = data.dimension;
   const bool has_far = has_far_beads(data, outline_um, far_distance_um);
   std::vector<double> used;
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    if (!is_used(data, i)) continue;
-    if (has_far && !is_far(beads[i].position_um, outline_um, far_distance_um)) continue;
-    const auto row = 2 * static_cast<Index>(i);
-    for (const double r : {residual[row], residual[row + 1]}) used.push_back(std::abs(r));
+  for (Index row = 0; row < residual.size(); ++row) {
+    if (!is_used(data, row / each)) continue;  // beside another cell it is no witness of rest
+    if (has_far && !is_far(data.position_um[row / each], outline_um, far_distance_um)) continue;
+    used.push_back(std::abs(residual[row]));
   }
   if (used.empty()) return {};
-  const std::string source = std::to_string(used.size() / 2) +
+  const std::string source = std::to_string(std::ssize(used) / each) +
                              (has_far ? " beads far from the cell" : " beads, too few of them far from the cell");
   return {.sigma_um = 1.4826 * numerics::median_in(used), .source = source};
 }

@@ -65,13 +65,13 @@ Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& 
 bool has_far_beads(const LinearData& data, const Polygon& outline_um, double far_distance_um);
 
 struct NoiseLevel {
-  double sigma_um = 0;  ///< standard deviation of a component
+  double sigma_um = 0;  ///< standard deviation of a component along the surface
   std::string source;
 };
 
 /// From what the model leaves unexplained at beads further than `far_distance_um` outside the outline: 1.4826 × the
 /// median magnitude of a component, which outliers do not move. Without far beads: of all beads.
-NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const VectorXd& forces_nN,
-                       const Polygon& outline_um, double far_distance_um);
+NoiseLevel noise_level(const LinearData& data, const VectorXd& forces_nN, const Polygon& outline_um,
+                       double far_distance_um);
 
 }  // namespace mbtfm::tensions

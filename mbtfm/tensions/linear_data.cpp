@@ -233,6 +233,16 @@ VectorXd residual_um(const LinearData& data, const VectorXd& forces_nN) {
   return less_motion(data, data.displacement_um - data.response->displace(forces_nN));
 }
 
+VectorXd evened_residual_um(const LinearData& data, const VectorXd& forces_nN) {
+  VectorXd residual = residual_um(data, forces_nN);
+  for (Index row = 0; row < residual.size(); ++row)
+    if (const Index along_x = row - row % data.dimension; is_used(data, row / data.dimension))
+      residual[row] *= data.weight_per_um[row] / data.weight_per_um[along_x];
+  return residual;
+}
+
+bool is_used(const LinearData& data, Index bead) { return data.weight_per_um[data.dimension * bead] > 0; }
+
 LinearData reweighted(LinearData data, const VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory

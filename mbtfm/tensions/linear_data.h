@@ -59,6 +59,7 @@ Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   std::vector<double> height_um = {};  ///< of the beads, in space; empty: all alike
+  std::vector<double> held_um = {};    ///< height at which each adhesion is pulled at, in space; empty: 0
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
   MatrixXd balance;          ///< 2·adhesions × sums that are zero where all forces balance; empty: not known
   VectorXd displacement_um;  ///< u: 2·beads, in the same order, less the offset
@@ -129,6 +130,10 @@ std::optional<OwnForces> own_forces_in(const LinearData& data);
 MatrixXd less_motion(const LinearData& data, MatrixXd displacements);
 /// What forces and motions leave: P (u − G R), um, 2·beads.
 VectorXd residual_um(const LinearData& data, const VectorXd& forces_nN);
+/// The same with each component over its standard error, times that along x: microscopes see worse along z.
+VectorXd evened_residual_um(const LinearData& data, const VectorXd& forces_nN);
+/// Whether the bead counts at all.
+bool is_used(const LinearData& data, Index bead);
 
 /// W² and the weights by bead: 2·beads.
 VectorXd squared_weights(const LinearData& data);
