@@ -171,8 +171,7 @@ MatrixXd by_network_adhesion(const BudgetInputs& in, const MatrixXd& by_cell_adh
   const Index each = in.data.dimension;
   MatrixXd weights(each * std::ssize(ids), by_cell_adhesion.rows());
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto at = std::find_if(in.cell.adhesions.begin(), in.cell.adhesions.end(),
-                                 [&](const Adhesion& a) { return a.adhesion_id == ids[i]; });
+    const auto at = std::ranges::find(in.cell.adhesions, ids[i], &Adhesion::adhesion_id);
     weights.middleRows(each * static_cast<Index>(i), each) =
         by_cell_adhesion.middleCols(each * (at - in.cell.adhesions.begin()), each).transpose();
   }
@@ -196,7 +195,9 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const s
   std::vector<substrate::Ellipse> ellipses{ellipse};
   for (const Variation& variation : variations) ellipses.push_back(variation.ellipse);
   AdhesionChanges changes{.near = beads_near(in.data, ellipse), .displacement = {}, .by_vertices = {}};
-  const MatrixXd fields = response_to(ellipses, observed_at(in.data, changes.near), half_space)->matrix();
+  std::vector<Vec3> places_um;
+  for (const Index b : changes.near) places_um.push_back(place_of_bead(in.data, b));
+  const MatrixXd fields = response_to(ellipses, places_um, each, half_space)->matrix();
   const auto n = static_cast<Index>(variations.size());
   changes.displacement.resize(fields.rows(), n);
   changes.by_vertices = MatrixXd::Zero(n_sums, n);
@@ -213,14 +214,12 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const s
 
 VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
   const auto sums = in.fit.meshes.front().fit.trial.rest->answer_to_geometry(by_network_adhesion(in, gain.of_model));
-  VectorXd tensions_nN(static_cast<Index>(in.fit.tensions.nN.size()));
-  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions.nN[i].value;
   const auto half_space = greens::make_greens(in.gel, {.model = substrate::ModelKind::half_space}, 1);
   std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
   numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
     changes[i] = changes_of(in, static_cast<std::size_t>(i), *half_space, *sums, gain.of_model.rows());
   });
-  VectorXd variance = sums->variance_of_free_ends(tensions_nN, in.segmentation.fibre_end_error_um);
+  VectorXd variance = sums->variance_of_free_ends(values_of(in.fit), in.segmentation.fibre_end_error_um);
   answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
     std::vector<VectorXd> by_adhesion(changes.size());
     numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
@@ -239,7 +238,7 @@ VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const 
 
 /// What these forces make of the beads on such a gel.
 VectorXd field_um(const BudgetInputs& in, const Gel& gel, substrate::ModelKind model, int threads) {
-  return response_to(substrate::ellipses_of(in.cell.adhesions), observed_at(in.data),
+  return response_to(substrate::ellipses_of(in.cell.adhesions), places_of_beads(in.data), in.data.dimension,
                      *greens::make_greens(gel, {.model = model}, threads))
       ->kept()
       ->displace(in.fit.forces.nN);
@@ -349,12 +348,9 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const auto parts = [&](Index i) {
     ErrorParts p{.beads = std::sqrt(std::max(0.0, mean.beads[i] - mean.place[i])),
                  .segmentation = std::sqrt(segmentation[i]),
-                 .mesh = {},
                  .substrate = std::sqrt(substrate[i]),
                  .solver = std::sqrt(mean.solver[i]),
-                 .model = std::sqrt(mean.model[i]),
-                 .gel = {},
-                 .place = {}};
+                 .model = std::sqrt(mean.model[i])};
     if (in.n_of_place > 0) p.place = std::sqrt(mean.place[i]);
     if (gel) p.gel = std::sqrt((*gel)[i]);
     if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mean.mesh[i]);
@@ -362,11 +358,9 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   };
   ErrorBudget budget;
   const auto n = static_cast<Index>(in.fit.tensions.fibre_ids.size());
-  for (Index i = 0; i < n; ++i) {
-    const auto at = static_cast<std::size_t>(i);
+  for (Index i = 0; i < n; ++i)
     budget.tensions.push_back(
-        {.fibre_id = in.fit.tensions.fibre_ids[at], .tension_nN = in.fit.tensions.nN[at].value, .parts_nN = parts(i)});
-  }
+        {.fibre_id = in.fit.tensions.fibre_ids[i], .tension_nN = in.fit.tensions.nN[i].value, .parts_nN = parts(i)});
   budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit), in.data.dimension);
   budget.total_force_parts_nN = parts(n);
   if (in.fit.cut) budget.cut_force = {.force_nN = in.fit.cut->magnitude_nN.value, .parts_nN = parts(n + 1)};

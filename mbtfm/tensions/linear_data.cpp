@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "mbtfm/inverse/rows.h"
 #include "pipeline/contract/errors.h"
@@ -112,23 +111,19 @@ Vec3 place_of_bead(const LinearData& data, Index bead) {
   return {x, y, data.height_um.empty() ? 0 : -data.height_um[bead]};
 }
 
-substrate::Observations observed_at(const LinearData& data, const std::vector<Index>& beads) {
-  std::vector<Vec2> along;
-  std::vector<Vec3> in_space;
-  for (const Index b : beads) along.push_back(data.position_um[b]), in_space.push_back(place_of_bead(data, b));
-  if (data.dimension == 2) return {along};
-  return {in_space, substrate::Components::all};
+std::vector<Vec3> places_of_beads(const LinearData& data) {
+  std::vector<Vec3> places_um;
+  for (Index b = 0; b < std::ssize(data.position_um); ++b) places_um.push_back(place_of_bead(data, b));
+  return places_um;
 }
 
-substrate::Observations observed_at(const LinearData& data) {
-  std::vector<Index> all(data.position_um.size());
-  std::iota(all.begin(), all.end(), 0);
-  return observed_at(data, all);
-}
-
-substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const substrate::Observations& at,
-                                    const substrate::Substrate& gel) {
-  return gel.response({ellipses, static_cast<int>(at.n_components())}, at);
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
+                                    Index dimension, const substrate::Substrate& gel) {
+  const substrate::Loads loads{ellipses, static_cast<int>(dimension)};
+  if (dimension > 2) return gel.response(loads, {places_um, substrate::Components::all});
+  std::vector<Vec2> along_um;
+  for (const Vec3& place : places_um) along_um.push_back({place.x, place.y});
+  return gel.response(loads, {along_um});
 }
 
 LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN, const std::vector<bool>& is_used) {

@@ -15,9 +15,8 @@
 #include "substrate/response.h"
 
 namespace mbtfm::substrate {
-class Substrate;      // see compliance.h
-struct Observations;  // see loads.h
-}  // namespace mbtfm::substrate
+class Substrate;  // see compliance.h
+}
 
 namespace mbtfm::tensions {
 
@@ -76,12 +75,10 @@ struct LinearData {
 
 /// In space, z into the gel.
 Vec3 place_of_bead(const LinearData& data, Index bead);
-/// What is observed of the gel at these beads, and at all.
-substrate::Observations observed_at(const LinearData& data, const std::vector<Index>& beads);
-substrate::Observations observed_at(const LinearData& data);
-/// How these points answer to forces on the ellipses, by a model of the gel, which must outlive it.
-substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const substrate::Observations& at,
-                                    const substrate::Substrate& gel);
+std::vector<Vec3> places_of_beads(const LinearData& data);
+/// How these places answer to forces on the ellipses, by a model of the gel, which must outlive it.
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
+                                    Index dimension, const substrate::Substrate& gel);
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
 /// @param response  2·beads × 2·adhesions

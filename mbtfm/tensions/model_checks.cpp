@@ -165,8 +165,7 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
   std::vector<FibreLeftOut> fibres;
   for (Index i = 1; i < static_cast<Index>(fit.tensions.fibre_ids.size()); ++i) {
-    FibreLeftOut left{
-        .fibre_id = fit.tensions.fibre_ids[i], .chi_squared_rise = 0, .aic_rise = 0, .n_informing_beads = 0};
+    FibreLeftOut left{.fibre_id = fit.tensions.fibre_ids[i], .n_informing_beads = influence.n_informing_beads[i]};
     for (const MeshFit& mesh : fit.meshes) {
       // Where t_i is held to t_0, 2 Phi rises by (t_i − t_0)² / Var(t_i − t_0), Var in units of the noise.
       const MatrixXd& c = mesh.covariance_nN2;
@@ -176,7 +175,6 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
       left.chi_squared_rise += difference * difference / variance / static_cast<double>(fit.meshes.size());
     }
     left.aic_rise = left.chi_squared_rise - 2;
-    left.n_informing_beads = influence.n_informing_beads[i];
     fibres.push_back(left);
   }
   return fibres;
@@ -287,7 +285,7 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
   const Index each = fit.data.dimension;
   const MatrixXd places_um = places_of(adhesions, fit.data);
 
-  std::vector<MissingFibre> found;
+  std::vector<std::pair<double, Pair>> found;      // by how much less misfit each alone would leave
   std::vector<ShortMatrix> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
   left.for_each_block([&](Index first, const MatrixXd& K) {
     for (auto b = static_cast<std::size_t>(first / each); each * static_cast<Index>(b) < K.rows(); ++b) {
@@ -303,24 +301,17 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
         if (slope <= 0 || curvature <= 0) continue;
         const double gain = slope * slope / curvature / variance;
         if (gain < limit * limit) continue;
-        found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
-                         .end_adhesion_id = adhesions[b].adhesion_id,
-                         .tension_nN = slope / curvature,
-                         .chi_squared_gain = gain});
+        found.push_back({gain, {a, b}});
       }
     }
   });
-  std::stable_sort(found.begin(), found.end(), [](const MissingFibre& x, const MissingFibre& y) {
-    return x.chi_squared_gain > y.chi_squared_gain;
-  });
+  std::ranges::stable_sort(found, std::greater(), &std::pair<double, Pair>::first);
   if (found.empty()) return {};
   std::vector<std::size_t> ends;  // adhesions, each once: two for each fibre
   const auto is_end = [&](std::size_t a) { return std::ranges::find(ends, a) != ends.end(); };
-  for (const MissingFibre& f : found) {
-    if (ends.size() == 2 * kMostMissingFibres) break;
-    const std::size_t a = place_of(f.start_adhesion_id, adhesions), b = place_of(f.end_adhesion_id, adhesions);
-    if (!is_end(a) && !is_end(b)) ends.insert(ends.end(), {a, b});
-  }
+  for (const auto& [gain, pair] : found)
+    if (ends.size() < 2 * kMostMissingFibres && !is_end(pair[0]) && !is_end(pair[1]))
+      ends.insert(ends.end(), pair.begin(), pair.end());
   std::vector<Index> components;
   std::vector<Pair> pairs;
   for (std::size_t k = 0; k < ends.size(); ++k) {

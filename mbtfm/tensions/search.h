@@ -22,7 +22,7 @@ namespace mbtfm::tensions {
 
 struct EnsembleFit;
 
-/// Of each place the displacement by forces of 1 nN/um times the root of its area: 2·beads × 2·places.
+/// Of each place the displacement by forces of 1 nN/um times the root of its area: components × components·places.
 MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places);
 
 struct Scores {

@@ -20,11 +20,7 @@ LinearData with_motions(const TensionScene& scene, const DisplacementField& bead
 }
 
 EnsembleFit fit_of(const TensionScene& scene, const LinearData& data, Loss loss = Loss::squares) {
-  FitParameters parameters;
-  parameters.loss = loss;
-  std::vector<cables::CableNetwork> networks;
-  networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-  return fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1);
+  return test::fit_to(data, scene, {.loss = loss});
 }
 
 TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
@@ -63,7 +59,7 @@ TEST(CommonMotion, what_was_planted_is_found_within_its_stated_error) {
     move(scene.beads, kMotion);
     const LinearData data = with_motions(scene, scene.beads);
     const EnsembleFit fit = fit_of(scene, data);
-    const FoundMotion found = common_motion_among(motions_beside(data, fit), data.position_um);
+    const FoundMotion found = common_motion_among(motions_beside(data, fit), data);
     const AffineMotion& m = found.motion;
     const Vec2 shift = m.shift - kMotion.at(m.centre);
     Eigen::VectorXd error(6);
@@ -82,7 +78,7 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
   for (unsigned draw = 1; draw <= kDraws; ++draw) {
     test::measure(scene, 0.05, draw);
     const LinearData data = with_motions(scene, scene.beads);
-    mean += curved_motion_beside(fit_of(scene, data), scene.beads).chi_squared / kDraws;
+    mean += curved_motion_beside(fit_of(scene, data)).chi_squared / kDraws;
   }
   EXPECT_NEAR(mean, 14, 4 * std::sqrt(2 * 14.0 / kDraws)) << "chi squared of 14 degrees of freedom";
   const double sigma_um = scene.beads.front().sigma_um;
@@ -97,7 +93,7 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
     bead.displacement_um += bent;
   }
   const LinearData data = with_motions(scene, scene.beads);
-  const CurvedMotion found = curved_motion_beside(fit_of(scene, data), scene.beads);
+  const CurvedMotion found = curved_motion_beside(fit_of(scene, data));
   EXPECT_GT(found.chi_squared, 36.1);
   EXPECT_GT(found.rms_um, 0.2 * std::sqrt(squares)) << "most of it is even growth, which is taken off";
   EXPECT_LT(found.rms_um, 2 * std::sqrt(squares));
