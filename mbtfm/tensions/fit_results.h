@@ -52,7 +52,8 @@ void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<A
 ///                            (an anchor, a candidate) the size is assumed, and half of this energy with it: there u is
 ///                            that of the beads on it, or of the nearest four. A tighter load has more, unseen
 ///   contractile_moment_nN_um −tr P, P = Σ x Fᵀ symmetrised, about the adhesions' centre: positive where the cell
-///                            contracts; its two parts along the axes of P, and the angle of the larger one
+///                            contracts; its two parts along the axes of P, and the angle of the larger one; in space
+///                            of what acts along the surface
 ///
 /// The energy is that of the exact layer of the gel's thickness and modulus; without it where the modulus changes with
 /// depth. No moments where the image cuts the cell: the forces beyond the cut are part of them.
