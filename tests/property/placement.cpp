@@ -215,7 +215,7 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
   const LinearData known = still.data_of(still.scene.beads);
-  const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1);
+  const EnsembleFit with_known = test::fit_to(known, still.scene);
   const Eigen::VectorXd& forces = with_known.forces.nN;
   const LinearData unknown =
       with_more_motions(known, placement_motions(test::kGel, still.scene.ellipses, forces, still.scene.points_um,

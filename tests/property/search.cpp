@@ -16,9 +16,7 @@ struct FittedToFew {
   FittedToFew() {
     const LinearData data =
         reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
-    std::vector<cables::CableNetwork> networks;
-    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    fit = fit_ensemble(networks, data, scene.adhesion_ids, {.loss = Loss::squares}, 1);
+    fit = test::fit_to(data, scene, {.loss = Loss::squares});
   }
 };
 
