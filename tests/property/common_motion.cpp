@@ -138,7 +138,7 @@ TEST(CommonMotion, of_beads_in_one_place_or_none_is_no_obstacle) {
   for (Bead& bead : beads) bead.position_um = {3, 4};
   const LinearData data = with_motions(scene, beads);
   EXPECT_TRUE(data.reduced.target.allFinite());
-  EXPECT_EQ(affine_motions({}).rows(), 0);
+  EXPECT_EQ(affine_motions(DisplacementField{}).rows(), 0);
 }
 
 TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {
