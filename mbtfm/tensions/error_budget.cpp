@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/parameters.h"

@@ -8,6 +8,7 @@
 
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
@@ -259,8 +260,9 @@ VectorXd displacement_under_um(const EnsembleFit& fit, const Cell& cell, const V
   constexpr double kCell_um = 1;
   const numerics::Near beads(places_of_beads(fit.data), kCell_um);
   const VectorXd moved_um = moved_by(fit.data, forces_nN);
+  const Index each = fit.data.dimension;
   for (Index a = 0; a < std::ssize(cell.adhesions); ++a)
-    if (const Index each = fit.data.dimension; assumed(cell.adhesions[a]))
+    if (assumed(cell.adhesions[a]))
       under.segment(each * a, each) = shown_by_beads_um(beads, moved_um, cell.adhesions[a]);
   return under;
 }

@@ -6,8 +6,6 @@
 #include "mbtfm/inverse/rows.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
-#include "substrate/compliance.h"
-#include "substrate/loads.h"
 
 namespace mbtfm::tensions {
 
@@ -115,15 +113,6 @@ std::vector<Vec3> places_of_beads(const LinearData& data) {
   std::vector<Vec3> places_um;
   for (Index b = 0; b < std::ssize(data.position_um); ++b) places_um.push_back(place_of_bead(data, b));
   return places_um;
-}
-
-substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
-                                    Index dimension, const substrate::Substrate& gel) {
-  const substrate::Loads loads{ellipses, static_cast<int>(dimension)};
-  if (dimension > 2) return gel.response(loads, {places_um, substrate::Components::all});
-  std::vector<Vec2> along_um;
-  for (const Vec3& place : places_um) along_um.push_back({place.x, place.y});
-  return gel.response(loads, {along_um});
 }
 
 LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN, const std::vector<bool>& is_used) {

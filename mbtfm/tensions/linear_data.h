@@ -14,10 +14,6 @@
 #include "pipeline/contract/geometry.h"
 #include "substrate/response.h"
 
-namespace mbtfm::substrate {
-class Substrate;  // see compliance.h
-}
-
 namespace mbtfm::tensions {
 
 /// Of so many components as `dimension` has: a force, a displacement, a way; and what maps one to another.
@@ -76,9 +72,6 @@ struct LinearData {
 /// In space, z into the gel.
 Vec3 place_of_bead(const LinearData& data, Index bead);
 std::vector<Vec3> places_of_beads(const LinearData& data);
-/// How these places answer to forces on the ellipses, by a model of the gel, which must outlive it.
-substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
-                                    Index dimension, const substrate::Substrate& gel);
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
 /// @param response  2·beads × 2·adhesions

@@ -10,8 +10,18 @@
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/triangle.h"
 #include "substrate/greens/models.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::tensions {
+
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
+                                    Index dimension, const substrate::Substrate& gel) {
+  const substrate::Loads loads{ellipses, static_cast<int>(dimension)};
+  if (dimension > 2) return gel.response(loads, {places_um, substrate::Components::all});
+  std::vector<Vec2> along_um;
+  for (const Vec3& place : places_um) along_um.push_back({place.x, place.y});
+  return gel.response(loads, {along_um});
+}
 
 MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
   const Index each = compliance_um_per_nN.cols() / std::max<Index>(1, std::ssize(places));

@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 
+#include "mbtfm/inverse/rows.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
@@ -162,6 +163,12 @@ inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_n
   TensionScene scene = scene_of(mesh::generate_network(cell, network).network, tensions_nN, ellipses, n_beads, seed);
   measure(scene, noise, seed);
   return scene;
+}
+
+/// Beads of the scene, which may move all alike, too.
+inline tensions::LinearData with_motions(const TensionScene& scene, const DisplacementField& beads) {
+  const Eigen::MatrixXd motions = inverse::affine_motions(beads);
+  return tensions::reduce(beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, motions);
 }
 
 /// The fit on the scene's own network.
