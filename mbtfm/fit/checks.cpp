@@ -48,8 +48,8 @@ FoundMotions motions_found(const ReadyCell& cell, const EnsembleFit& fit, const 
   FoundMotions found;
   if (cell.decisions.placement.is_on) found.placement = placement_among(motions, cell.placement);
   if (!allows_common_motion(switches)) return found;
-  found.common = common_motion_among(motions, fit.data.position_um);
-  found.curved = curved_motion_beside(fit, cell.scene.beads);
+  found.common = common_motion_among(motions, fit.data);
+  found.curved = curved_motion_beside(fit);
   return found;
 }
 

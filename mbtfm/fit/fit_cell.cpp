@@ -182,7 +182,6 @@ ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Param
                        .data = fit.data,
                        .networks = cell.networks,
                        .cell = cell.scene.cell,
-                       .beads = cell.scene.beads,
                        .gel = p.gel,
                        .substrate_error = substrate_error(cell),
                        .lacks_base = !cell.gel->capabilities().base,

@@ -24,14 +24,22 @@ WeightedBeads weighted(const DisplacementField& beads, double sum) {
 }
 
 MatrixXd affine_motions(const DisplacementField& beads) {
-  Vec2 sum;
-  for (const Bead& bead : beads) sum += bead.position_um;
-  const Vec2 centre = 1 / std::max<double>(1, static_cast<double>(beads.size())) * sum;
-  MatrixXd motions(2 * std::ssize(beads), 6);
-  for (Index i = 0; i < std::ssize(beads); ++i) {
-    const Vec2 d = beads[i].position_um - centre;
-    motions.middleRows<2>(2 * i) << 1, 0, -d.y, d.x, d.x, d.y,  //
-        0, 1, d.x, d.y, -d.y, d.x;
+  std::vector<Vec3> beads_um;
+  for (const Bead& bead : beads) beads_um.push_back({bead.position_um.x, bead.position_um.y, 0});
+  const Index n = std::ssize(beads);
+  return affine_motions(beads_um).leftCols(6).reshaped(3, 6 * n).topRows(2).reshaped(2 * n, 6);
+}
+
+MatrixXd affine_motions(const std::vector<Vec3>& beads_um) {
+  Vec3 sum;
+  for (const Vec3& bead : beads_um) sum += bead;
+  const Vec3 centre = 1 / std::max<double>(1, static_cast<double>(beads_um.size())) * sum;
+  MatrixXd motions(3 * std::ssize(beads_um), 9);
+  for (Index i = 0; i < std::ssize(beads_um); ++i) {
+    const Vec3 d = beads_um[i] - centre;
+    motions.middleRows<3>(3 * i) << 1, 0, -d.y, d.x, d.x, d.y, 0, 0, d.z,  //
+        0, 1, d.x, d.y, -d.y, d.x, 0, -d.z, 0,                             //
+        0, 0, 0, d.z, 0, 0, 1, d.y, -d.x;
   }
   return motions;
 }

@@ -24,6 +24,8 @@ WeightedBeads weighted(const DisplacementField& beads, double sum);
 /// The six affine motions of unit size as displacements of places, 2·beads × 6, about their centre: shift (um), then
 /// turn, growth and two shears (relative).
 MatrixXd affine_motions(const DisplacementField& beads);
+/// The same in space, 3·beads × 9: these, a growth into the gel, too, then a shift into it and the turns about x and y.
+MatrixXd affine_motions(const std::vector<Vec3>& beads_um);
 
 /// P W: rows times their weights W, and with the columns C of the blocks as further unknowns of any size: P = 1 −
 /// QQᵀ with Q an orthonormal basis of W C. What is fitted to such rows is what a fit with these blocks finds (Frisch &

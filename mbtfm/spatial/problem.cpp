@@ -275,18 +275,12 @@ inverse::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, 
 }
 
 MatrixXd common_motions(const Observed& observed) {
-  const auto& beads = std::get<std::vector<Vec3>>(observed.at.points_um);
-  const Index n = observed.n_components();
-  Vec3 centre;
-  for (const Vec3& bead : beads) centre += 1 / static_cast<double>(beads.size()) * bead;
-  MatrixXd motions = MatrixXd::Zero(n * observed.n_beads, n + 1);
-  for (Index b = 0; b < observed.n_beads; ++b) {
-    motions.block(n * b, 0, n, n).setIdentity();
-    const Vec3 d = beads[b] - centre;
-    motions(n * b, n) = -d.y;
-    motions(n * b + 1, n) = d.x;
-  }
-  return motions;
+  const Index n = observed.n_components(), n_beads = observed.n_beads;
+  std::vector<Index> columns = {0, 1, 6, 2};  // shifts, turn about z
+  if (n == 2) columns.erase(columns.begin() + 2);
+  const MatrixXd motions =
+      inverse::affine_motions(std::get<std::vector<Vec3>>(observed.at.points_um))(Eigen::all, columns);
+  return motions.reshaped(3, (n + 1) * n_beads).topRows(n).reshaped(n * n_beads, n + 1);
 }
 
 inverse::Rows rows_of(const Problem& problem, const VectorXd& weights_by_row, const MatrixXd& columns) {

@@ -47,20 +47,21 @@ inline constexpr double kUsualGrowth = 0.003;
 struct FoundMotion {
   AffineMotion motion;  ///< um
   VectorXd sigma;
+  VectorXd out_of_plane = {};  ///< in space: shift into the gel (um), turns about x and y (rad)
 };
-/// @param motions  the first six those of affine_motions()
-FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um);
+/// @param motions  the first ones those of affine_motions()
+FoundMotion common_motion_among(const MotionsBeside& motions, const LinearData& data);
 
 /// Of a component, over these places.
 double rms_um(const AffineMotion& motion, const std::vector<Vec2>& places_um);
 
 /// What all beads do together that is not affine, as stitched tiles, a rolling shutter or a lens make it: displacements
-/// of second and third degree in x and y, fourteen numbers. By a score test.
+/// along the surface of second and third degree in x and y, fourteen numbers. By a score test.
 struct CurvedMotion {
   double chi_squared = 0;  ///< 14 degrees of freedom where there is none
   double rms_um = 0;       ///< of the beads' displacement by the best of them, the tensions following
 };
-CurvedMotion curved_motion_beside(const EnsembleFit& fit, const DisplacementField& beads);
+CurvedMotion curved_motion_beside(const EnsembleFit& fit);
 
 /// Always on but where it is switched off: a motion too small to be noticed still shifts the total force by some of its
 /// standard errors, and what it costs where there is none is little (docs/effects.md).

@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/parameters.h"
-#include "substrate/greens/layer.h"
 #include "substrate/greens/models.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
@@ -22,7 +22,7 @@ using substrate::Ellipse;
 
 /// Sums of forces that have a budget of their own besides the tensions, by force: the total; through the cut, if any.
 MatrixXd sums_of(const EnsembleFit& fit) {
-  MatrixXd sums = directions_of(adhesion_forces_nN(fit));
+  MatrixXd sums = directions_of(adhesion_forces_nN(fit), fit.data.dimension);
   if (!fit.cut) return sums;
   sums.conservativeResize(Eigen::NoChange, 2);
   sums.col(1) = along_cut(fit.cut->direction(), sums.rows());
@@ -156,25 +156,12 @@ std::vector<Variation> variations_of(const substrate::Ellipse& ellipse, const Se
 // this many semi-axes. There base and sides of the gel change nothing.
 constexpr double kReach = 6;
 
-/// Change of the displacement (um) of these beads, as the force of `before` comes from `after`: x, y in turn.
-VectorXd change_by_other_ellipse(const BudgetInputs& in, const std::vector<Index>& near,
-                                 const substrate::Ellipse& before, const substrate::Ellipse& after, Vec2 force_nN) {
-  const greens::HalfSpaceEllipse old(in.gel, before), other(in.gel, after);
-  VectorXd change(2 * static_cast<Index>(near.size()));
-  for (std::size_t i = 0; i < near.size(); ++i) {
-    const Vec2 at = in.beads[near[i]].position_um;
-    const Vec2 u = (other.compliance_um_per_nN(at) - old.compliance_um_per_nN(at)) * force_nN;
-    change.segment<2>(2 * static_cast<Index>(i)) << u.x, u.y;
-  }
-  return change;
-}
-
-std::vector<Index> beads_near(const DisplacementField& beads, const substrate::Ellipse& ellipse) {
+std::vector<Index> beads_near(const LinearData& data, const substrate::Ellipse& ellipse) {
   std::vector<Index> near;
   const double reach_um = kReach * ellipse.semi_major_um;
-  for (std::size_t b = 0; b < beads.size(); ++b) {
-    const Vec2 d = beads[b].position_um - ellipse.centre_um;
-    if (dot(d, d) < reach_um * reach_um) near.push_back(static_cast<Index>(b));
+  for (Index b = 0; b < std::ssize(data.position_um); ++b) {
+    const Vec2 d = data.position_um[b] - ellipse.centre_um;
+    if (dot(d, d) < reach_um * reach_um) near.push_back(b);
   }
   return near;
 }
@@ -182,12 +169,12 @@ std::vector<Index> beads_near(const DisplacementField& beads, const substrate::E
 /// Forces of the first network by adhesion of the cell, as weights by adhesion of the network.
 MatrixXd by_network_adhesion(const BudgetInputs& in, const MatrixXd& by_cell_adhesion) {
   const std::vector<int>& ids = in.networks.front().adhesion_ids();
-  MatrixXd weights(2 * static_cast<Index>(ids.size()), by_cell_adhesion.rows());
+  const Index each = in.data.dimension;
+  MatrixXd weights(each * std::ssize(ids), by_cell_adhesion.rows());
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto at = std::find_if(in.cell.adhesions.begin(), in.cell.adhesions.end(),
-                                 [&](const Adhesion& a) { return a.adhesion_id == ids[i]; });
-    weights.middleRows<2>(2 * static_cast<Index>(i)) =
-        by_cell_adhesion.middleCols<2>(2 * (at - in.cell.adhesions.begin())).transpose();
+    const auto at = std::ranges::find(in.cell.adhesions, ids[i], &Adhesion::adhesion_id);
+    weights.middleRows(each * static_cast<Index>(i), each) =
+        by_cell_adhesion.middleCols(each * (at - in.cell.adhesions.begin()), each).transpose();
   }
   return weights;
 }
@@ -195,24 +182,29 @@ MatrixXd by_network_adhesion(const BudgetInputs& in, const MatrixXd& by_cell_adh
 /// What an adhesion's standard errors change, variation by variation.
 struct AdhesionChanges {
   std::vector<Index> near;  ///< beads
-  MatrixXd displacement;    ///< theirs: 2·near × variations
+  MatrixXd displacement;    ///< theirs: components × variations
   MatrixXd by_vertices;     ///< answers to the vertices held otherwise: rows × variations
 };
 
-AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const network::GeometryAnswer& sums,
-                           Index n_sums) {
+AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const substrate::Substrate& half_space,
+                           const network::GeometryAnswer& sums, Index n_sums) {
   const Adhesion& a = in.cell.adhesions[adhesion];
   const substrate::Ellipse ellipse = substrate::ellipse_of(a);
-  const auto row = 2 * static_cast<Index>(adhesion);
-  const Vec2 force_nN{in.fit.forces.nN[row], in.fit.forces.nN[row + 1]};
+  const Index each = in.data.dimension;
+  const VectorXd force_nN = in.fit.forces.nN.segment(each * static_cast<Index>(adhesion), each);
   const std::vector<Variation> variations = variations_of(ellipse, in.segmentation);
-  AdhesionChanges changes{.near = beads_near(in.beads, ellipse), .displacement = {}, .by_vertices = {}};
+  std::vector<substrate::Ellipse> ellipses{ellipse};
+  for (const Variation& variation : variations) ellipses.push_back(variation.ellipse);
+  AdhesionChanges changes{.near = beads_near(in.data, ellipse), .displacement = {}, .by_vertices = {}};
+  std::vector<Vec3> places_um;
+  for (const Index b : changes.near) places_um.push_back(place_of_bead(in.data, b));
+  const MatrixXd fields = response_to(ellipses, places_um, each, half_space)->matrix();
   const auto n = static_cast<Index>(variations.size());
-  changes.displacement.resize(2 * static_cast<Index>(changes.near.size()), n);
+  changes.displacement.resize(fields.rows(), n);
   changes.by_vertices = MatrixXd::Zero(n_sums, n);
   for (Index v = 0; v < n; ++v) {
     const Variation& variation = variations[v];
-    changes.displacement.col(v) = change_by_other_ellipse(in, changes.near, ellipse, variation.ellipse, force_nN);
+    changes.displacement.col(v) = (fields.middleCols(each * (v + 1), each) - fields.leftCols(each)) * force_nN;
     changes.by_vertices.col(v) = sums.to_adhesion(a.adhesion_id, [&](Vec2 point_um) {
       const Vec2 arm = point_um - a.position_um;
       return variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
@@ -223,22 +215,21 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const n
 
 VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
   const auto sums = in.fit.meshes.front().fit.trial.rest->answer_to_geometry(by_network_adhesion(in, gain.of_model));
-  VectorXd tensions_nN(static_cast<Index>(in.fit.tensions.nN.size()));
-  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions.nN[i].value;
+  const auto half_space = greens::make_greens(in.gel, {.model = substrate::ModelKind::half_space}, 1);
   std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
   numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
-    changes[i] = changes_of(in, static_cast<std::size_t>(i), *sums, gain.of_model.rows());
+    changes[i] = changes_of(in, static_cast<std::size_t>(i), *half_space, *sums, gain.of_model.rows());
   });
-  VectorXd variance = sums->variance_of_free_ends(tensions_nN, in.segmentation.fibre_end_error_um);
+  VectorXd variance = sums->variance_of_free_ends(values_of(in.fit), in.segmentation.fibre_end_error_um);
   answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
     std::vector<VectorXd> by_adhesion(changes.size());
     numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
       const AdhesionChanges& c = changes[i];
       MatrixXd answer = c.by_vertices.middleRows(first, of_beads.rows());
-      for (std::size_t b = 0; b < c.near.size(); ++b) {
-        answer += numerics::small_product(of_beads.middleCols<2>(2 * c.near[b]),
-                                          c.displacement.middleRows<2>(2 * static_cast<Index>(b)));
-      }
+      const Index each = in.data.dimension;
+      for (Index b = 0; b < std::ssize(c.near); ++b)
+        answer += numerics::small_product(of_beads.middleCols(each * c.near[b], each),
+                                          c.displacement.middleRows(each * b, each));
       by_adhesion[i] = answer.cwiseAbs2().rowwise().sum();
     });
     for (const VectorXd& v : by_adhesion) variance.segment(first, of_beads.rows()) += v;
@@ -246,19 +237,12 @@ VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const 
   return variance;
 }
 
-/// The displacement by which the base changes the field of these forces: smooth, so that of point forces.
-VectorXd field_of_base_um(const BudgetInputs& in) {
-  const greens::Layer layer(in.gel);
-  VectorXd field = VectorXd::Zero(2 * static_cast<Index>(in.beads.size()));
-  for (std::size_t b = 0; b < in.beads.size(); ++b) {
-    for (std::size_t a = 0; a < in.cell.adhesions.size(); ++a) {
-      const Eigen::Vector2d f = in.fit.forces.nN.segment<2>(2 * static_cast<Index>(a));
-      const Vec2 offset = in.beads[b].position_um - in.cell.adhesions[a].position_um;
-      const Vec2 u = layer.point_correction_um_per_nN(offset) * Vec2{f.x(), f.y()};
-      field.segment<2>(2 * static_cast<Index>(b)) += Eigen::Vector2d(u.x, u.y);
-    }
-  }
-  return field;
+/// What these forces make of the beads on such a gel.
+VectorXd field_um(const BudgetInputs& in, const Gel& gel, substrate::ModelKind model, int threads) {
+  return response_to(substrate::ellipses_of(in.cell.adhesions), places_of_beads(in.data), in.data.dimension,
+                     *greens::make_greens(gel, {.model = model}, threads))
+      ->kept()
+      ->displace(in.fit.forces.nN);
 }
 
 /// The tensions and the sums of forces.
@@ -272,29 +256,19 @@ VectorXd values_of_rows(const EnsembleFit& fit) {
 
 /// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
 /// No model shows which of the two it is: both are counted.
-VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
+VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
   const VectorXd values = values_of_rows(in.fit);
   VectorXd variance = (in.substrate_error * values).cwiseAbs2();
-  for (Index a = 0; a < in.fit.forces.nN.size(); a += 2) {
-    variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces.nN.segment<2>(a)).cwiseAbs2();
-  }
+  for (Index a = 0, each = in.data.dimension; a < in.fit.forces.nN.size(); a += each)
+    variance +=
+        (in.substrate_error * gain.of_forces.middleCols(a, each) * in.fit.forces.nN.segment(a, each)).cwiseAbs2();
   if (!in.lacks_base) return variance;
-  const VectorXd field = field_of_base_um(in);
+  const VectorXd field = field_um(in, in.gel, substrate::ModelKind::layer, threads) -
+                         field_um(in, in.gel, substrate::ModelKind::half_space, threads);  // by the base
   answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
     variance.segment(first, of_beads.rows()) += numerics::matvec(of_beads, field).cwiseAbs2();
   });
   return variance;
-}
-
-/// What the beads would show more if the gel were another.
-VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int threads) {
-  const auto field = [&](const Gel& gel) {
-    return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads)
-        ->response({substrate::ellipses_of(in.cell.adhesions)}, {points_of(in.beads)})
-        ->kept()
-        ->displace(in.fit.forces.nN);
-  };
-  return field(other) - field(in.gel);
 }
 
 /// Of what the user states of the gel; none where nothing is stated. Forces and tensions are proportional to the
@@ -306,7 +280,8 @@ std::optional<VectorXd> gel_variances(const BudgetInputs& in, const BeadAnswers&
   const VectorXd values = values_of_rows(in.fit);
   VectorXd variance = (gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa * values).cwiseAbs2();
   for (const Gel& other : gels_an_error_away(gel)) {
-    const VectorXd change = change_by_other_gel_um(in, other, threads);
+    const VectorXd change = field_um(in, other, substrate::ModelKind::layer, threads) -
+                            field_um(in, gel, substrate::ModelKind::layer, threads);
     answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
       variance.segment(first, of_beads.rows()) += numerics::matvec(of_beads, change).cwiseAbs2();
     });
@@ -369,17 +344,14 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   if (in.fit.model_error)
     mean.mesh[static_cast<Index>(in.fit.tensions.fibre_ids.size())] += std::pow(roughness_of_total(in.fit).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
-  const VectorXd substrate = substrate_variances(in, gain, answers);
+  const VectorXd substrate = substrate_variances(in, gain, answers, threads);
   const std::optional<VectorXd> gel = gel_variances(in, answers, threads);
   const auto parts = [&](Index i) {
     ErrorParts p{.beads = std::sqrt(std::max(0.0, mean.beads[i] - mean.place[i])),
                  .segmentation = std::sqrt(segmentation[i]),
-                 .mesh = {},
                  .substrate = std::sqrt(substrate[i]),
                  .solver = std::sqrt(mean.solver[i]),
-                 .model = std::sqrt(mean.model[i]),
-                 .gel = {},
-                 .place = {}};
+                 .model = std::sqrt(mean.model[i])};
     if (in.n_of_place > 0) p.place = std::sqrt(mean.place[i]);
     if (gel) p.gel = std::sqrt((*gel)[i]);
     if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mean.mesh[i]);
@@ -387,12 +359,10 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   };
   ErrorBudget budget;
   const auto n = static_cast<Index>(in.fit.tensions.fibre_ids.size());
-  for (Index i = 0; i < n; ++i) {
-    const auto at = static_cast<std::size_t>(i);
+  for (Index i = 0; i < n; ++i)
     budget.tensions.push_back(
-        {.fibre_id = in.fit.tensions.fibre_ids[at], .tension_nN = in.fit.tensions.nN[at].value, .parts_nN = parts(i)});
-  }
-  budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit));
+        {.fibre_id = in.fit.tensions.fibre_ids[i], .tension_nN = in.fit.tensions.nN[i].value, .parts_nN = parts(i)});
+  budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit), in.data.dimension);
   budget.total_force_parts_nN = parts(n);
   if (in.fit.cut) budget.cut_force = {.force_nN = in.fit.cut->magnitude_nN.value, .parts_nN = parts(n + 1)};
   return budget;

@@ -30,7 +30,6 @@ struct BudgetInputs {
   const LinearData& data;
   network::Ensemble networks;
   const Cell& cell;
-  const DisplacementField& beads;
   Gel gel;
   double substrate_error = 0;
   bool lacks_base = false;  ///< the substrate is a half-space

@@ -36,21 +36,22 @@ std::vector<Vec2> named_places(const FitOutcome& o) {
 std::vector<bool> elsewhere(const LinearData& data, const std::vector<Vec2>& places) {
   constexpr double kNear_um = 6;  // reach of a force among those of many others, as the search for it has it
   std::vector<bool> is_elsewhere;
-  for (std::size_t b = 0; b < data.position_um.size(); ++b)
-    is_elsewhere.push_back(
-        data.weight_per_um[2 * static_cast<Index>(b)] > 0 &&
-        std::ranges::none_of(places, [&](Vec2 place) { return norm(data.position_um[b] - place) < kNear_um; }));
+  for (Index b = 0; b < std::ssize(data.position_um); ++b)
+    is_elsewhere.push_back(is_used(data, b) && std::ranges::none_of(places, [&](Vec2 place) {
+                             return norm(data.position_um[b] - place) < kNear_um;
+                           }));
   return is_elsewhere;
 }
 
 /// Squares that the forces leave of these beads, over those of the noise.
 double left_of(const FitOutcome& o, const std::vector<bool>& beads) {
-  const VectorXd residual = residual_um(o.data, adhesion_forces_nN(o.fit));
+  const VectorXd residual = evened_residual_um(o.data, adhesion_forces_nN(o.fit));
+  const Index each = o.data.dimension;
   double squares = 0, n = 0;
-  for (std::size_t b = 0; b < beads.size(); ++b) {
+  for (Index b = 0; b < std::ssize(beads); ++b) {
     if (!beads[b]) continue;
-    squares += residual.segment<2>(2 * static_cast<Index>(b)).squaredNorm();
-    n += 2;
+    squares += residual.segment(each * b, each).squaredNorm();
+    n += static_cast<double>(each);
   }
   return n > 0 && o.summary.noise_um > 0 ? squares / (n * std::pow(o.summary.noise_um, 2)) : 0;
 }
@@ -61,9 +62,10 @@ Severity beneath_named(Symptom symptom, double number_elsewhere) {
   return number_elsewhere > known.threshold ? known.severity : Severity::note;
 }
 
+/// Of a component along the surface.
 double stated_noise_um(const LinearData& data) {
   double squares = 0, n = 0;
-  for (Index i = 0; i < data.weight_per_um.size(); ++i) {
+  for (Index i = 0; i < data.weight_per_um.size(); i += data.dimension) {
     if (data.weight_per_um[i] <= 0) continue;
     squares += 1 / (data.weight_per_um[i] * data.weight_per_um[i]);
     n += 1;
@@ -77,7 +79,7 @@ struct Region {
   double side_um = 0, chi_squared = 0;  ///< by degree of freedom
 };
 
-/// The one whose beads the model explains worst. @param residual  um, 2·beads  @param beads  those to look at
+/// The one whose beads the model explains worst. @param residual  evened  @param beads  those to look at
 Region worst_region(const LinearData& data, const VectorXd& residual, double noise_um, const std::vector<bool>& beads) {
   constexpr double kBeads = 60, kFewest = 30;
   const Extent field = extent_of(data.position_um);
@@ -90,11 +92,11 @@ Region worst_region(const LinearData& data, const VectorXd& residual, double noi
   };
   std::map<std::pair<int, int>, Sum> sums;
   for (std::size_t b = 0; b < data.position_um.size(); ++b) {
-    const auto row = 2 * static_cast<Index>(b);
+    const Index each = data.dimension, row = each * static_cast<Index>(b);
     if (!beads[b]) continue;
     const Vec2 at = (1 / side_um) * (data.position_um[b] - low);
     Sum& sum = sums[{static_cast<int>(at.x), static_cast<int>(at.y)}];
-    sum.squares += residual.segment<2>(row).squaredNorm() / (2 * noise_um * noise_um);
+    sum.squares += residual.segment(row, each).squaredNorm() / (static_cast<double>(each) * noise_um * noise_um);
     sum.n += 1;
   }
   Region worst{.centre_um = {}, .side_um = side_um, .chi_squared = 0};
@@ -126,7 +128,7 @@ Noticed noise_disagrees(const FitOutcome& o) {
 
 /// The same of the worst region.
 Noticed beads_disagree(const FitOutcome& o) {
-  const VectorXd residual = residual_um(o.data, adhesion_forces_nN(o.fit));
+  const VectorXd residual = evened_residual_um(o.data, adhesion_forces_nN(o.fit));
   const auto worst_among = [&](const std::vector<Vec2>& places) {
     return worst_region(o.data, residual, o.summary.noise_um, elsewhere(o.data, places));
   };
@@ -324,11 +326,12 @@ std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions,
 }
 
 Imbalance imbalance_of(const EnsembleFit& fit) {
-  Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
-  for (Index i = 0; i < fit.forces.nN.size(); i += 2) net_nN += fit.forces.nN.segment<2>(i);
+  const Index each = fit.data.dimension;
   const CutReaction cut = fit.cut ? fit.cut->reaction : CutReaction{};
+  VectorXd net_nN = fit.forces.nN.reshaped(each, fit.forces.nN.size() / each).rowwise().sum();
+  net_nN.head<2>() += cut.force_nN;
   constexpr double kTiny = 1e-300;  // a cell without any force is balanced
-  return {.force = (net_nN + cut.force_nN).norm() / std::max(total_nN(fit.forces.nN), kTiny),
+  return {.force = net_nN.norm() / std::max(total_nN(fit.forces.nN, each), kTiny),
           .torque = std::abs(fit.forces.torques_nN_um.sum() + cut.torque_nN_um) /
                     std::max(fit.forces.torques_nN_um.cwiseAbs().sum(), kTiny)};
 }

@@ -8,6 +8,7 @@
 
 #include "mbtfm/tensions/ensemble.h"
 #include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/search.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/numbers.h"
@@ -83,14 +84,14 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
   const VectorXd exerted_nN = adhesion_forces_nN(fit);  // forces of their own act at the centres
   std::vector<AdhesionForce> forces;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
-    const auto at = 2 * static_cast<Index>(a);
+    const Index each = fit.data.dimension, at = each * static_cast<Index>(a);
     const Vec2 network_nN{fit.forces.nN[at], fit.forces.nN[at + 1]};
     const double about_origin_nN_um = fit.forces.torques_nN_um[static_cast<Index>(a)];
     const Vec2 force_nN{exerted_nN[at], exerted_nN[at + 1]};
     const Estimate& magnitude_nN = fit.forces.magnitudes[a];
     const double student = quantile_975(magnitude_nN) / kNormal95;  // as in interval_95
     const numerics::MagnitudeInterval interval =
-        numerics::magnitude_interval_95(norm(force_nN), student * magnitude_nN.standard_error);
+        numerics::magnitude_interval_95(exerted_nN.segment(at, each).norm(), student * magnitude_nN.standard_error);
     forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
                       .force_nN = force_nN,
                       .sigma_nN = if_finite(magnitude_nN.standard_error),
@@ -141,8 +142,7 @@ double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
 FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
                       const FitParameters& parameters) {
   const Polygon& outline_um = scene.cell.outline_um;
-  const NoiseLevel noise =
-      noise_level(scene.beads, fit.data, adhesion_forces_nN(fit), outline_um, parameters.far_distance_um);
+  const NoiseLevel noise = noise_level(fit.data, adhesion_forces_nN(fit), outline_um, parameters.far_distance_um);
   const Imbalance balance = imbalance_of(fit);
   const VectorXd exerted_nN = adhesion_forces_nN(fit), beside_nN = exerted_nN - fit.forces.nN;
   FitSummary s;
@@ -156,24 +156,25 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
   s.n_meshes = static_cast<int>(fit.meshes.size());
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
-  s.more = {{"noise_source", noise.source},
-            {"chi_squared_per_degree", fit.misfit.chi_squared_per_degree},
-            {"total_force_sigma_nN", fit.total_force_nN.standard_error},
-            {"network_force_sigma_nN", fit.network_force_nN.standard_error},
-            {"force_beside_network_nN",
-             std::sqrt(2 * beside_nN.squaredNorm() / static_cast<double>(std::max<Index>(1, beside_nN.size())))},
-            {"network_explains", 1 - beside_nN.squaredNorm() / std::max(exerted_nN.squaredNorm(), 1e-300)},
-            {"edge_force_nN", fit.forces.edge.sum_nN},
-            {"edge_force_probability", fit.forces.edge.probability},
-            {"net_force_over_total", balance.force},
-            {"net_torque_over_total", balance.torque},
-            {"tension_error_from_noise_nN", over_fibres(fit, [](const Estimate& t) { return t.noise; })},
-            {"tension_error_from_mesh_nN", over_fibres(fit, [](const Estimate& t) { return t.from_model(); })},
-            {"n_beads", std::int64_t(scene.beads.size())},
-            {"n_flagged_beads", std::int64_t(scene.n_flagged)},
-            {"method", name_of(parameters.method)},
-            {"loss", name_of(fit.misfit.loss)},
-            {"reason", fit.report.reason}};
+  s.more = {
+      {"noise_source", noise.source},
+      {"chi_squared_per_degree", fit.misfit.chi_squared_per_degree},
+      {"total_force_sigma_nN", fit.total_force_nN.standard_error},
+      {"network_force_sigma_nN", fit.network_force_nN.standard_error},
+      {"force_beside_network_nN",
+       std::sqrt(beside_nN.squaredNorm() / std::max<double>(1, static_cast<double>(scene.cell.adhesions.size())))},
+      {"network_explains", 1 - beside_nN.squaredNorm() / std::max(exerted_nN.squaredNorm(), 1e-300)},
+      {"edge_force_nN", fit.forces.edge.sum_nN},
+      {"edge_force_probability", fit.forces.edge.probability},
+      {"net_force_over_total", balance.force},
+      {"net_torque_over_total", balance.torque},
+      {"tension_error_from_noise_nN", over_fibres(fit, [](const Estimate& t) { return t.noise; })},
+      {"tension_error_from_mesh_nN", over_fibres(fit, [](const Estimate& t) { return t.from_model(); })},
+      {"n_beads", std::int64_t(scene.beads.size())},
+      {"n_flagged_beads", std::int64_t(scene.n_flagged)},
+      {"method", name_of(parameters.method)},
+      {"loss", name_of(fit.misfit.loss)},
+      {"reason", fit.report.reason}};
   if (!fit.cut) return s;
   const Figures of_cut = figures_of(*fit.cut, fit, scene.cell.adhesions);
   s.more.insert(s.more.end(), of_cut.begin(), of_cut.end());
@@ -189,7 +190,7 @@ DisplacementField field_of(const VectorXd& forces_nN, const DisplacementField& b
   }
   DisplacementField field = beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
-    const auto row = 2 * static_cast<Index>(i);
+    const Index row = data.dimension * static_cast<Index>(i);
     field[i].displacement_um = {model[row], model[row + 1]};
     field[i].sigma_um = 0;
   }
@@ -219,35 +220,36 @@ void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<A
 
 namespace {
 
-/// By adhesion (x, y): the mean displacement under it.
+/// By adhesion and component: the mean displacement under it.
 VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN,
                               const Gel& gel, int threads) {
   std::vector<std::vector<substrate::DiscPoint>> rules;
-  std::vector<Vec2> points_um;
+  const Index each = forces_nN.size() / std::max<Index>(1, std::ssize(ellipses));
+  std::vector<Vec3> points_um;
   for (const substrate::Ellipse& e : ellipses) {
     rules.push_back(substrate::ellipse_rule(e, 5));
-    for (const substrate::DiscPoint& p : rules.back()) points_um.push_back(e.centre_um + p.position);
+    for (const substrate::DiscPoint& p : rules.back())
+      points_um.push_back({e.centre_um.x + p.position.x, e.centre_um.y + p.position.y, 0});
   }
   const auto layer = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads);
-  const VectorXd at_points = layer->response({ellipses}, {points_um})->displace(forces_nN);
+  const VectorXd at_points = response_to(ellipses, points_um, each, *layer)->displace(forces_nN);
   VectorXd mean = VectorXd::Zero(forces_nN.size());
   Index point = 0;
   for (Index a = 0; a < std::ssize(ellipses); ++a) {
     for (const substrate::DiscPoint& p : rules[a])
-      mean.segment<2>(2 * a) += p.weight * at_points.segment<2>(2 * point++);
+      mean.segment(each * a, each) += p.weight * at_points.segment(each * point++, each);
   }
   return mean;
 }
 
 /// Mean of what the forces make of the beads on an adhesion, or of the four nearest.
-Eigen::Vector2d shown_by_beads_um(const numerics::Near& beads, const VectorXd& moved_um, const Adhesion& adhesion) {
+VectorXd shown_by_beads_um(const numerics::Near& beads, const VectorXd& moved_um, const Adhesion& adhesion) {
   constexpr std::size_t kNearest = 4;
   const Vec3 place{adhesion.position_um.x, adhesion.position_um.y, 0};
   std::vector<int> shown = beads.within(place, adhesion.major_axis_um / 2, static_cast<int>(beads.points().size()));
   if (shown.size() < kNearest) shown = beads.nearest(place, kNearest);
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const int bead : shown) sum += moved_um.segment<2>(2 * Index{bead});
-  return sum / static_cast<double>(shown.size());
+  const Index n = std::ssize(beads.points());
+  return moved_um.reshaped(moved_um.size() / n, n)(Eigen::all, shown).rowwise().mean();
 }
 
 VectorXd displacement_under_um(const EnsembleFit& fit, const Cell& cell, const VectorXd& forces_nN, const Gel& gel,
@@ -255,13 +257,13 @@ VectorXd displacement_under_um(const EnsembleFit& fit, const Cell& cell, const V
   VectorXd under = mean_displacement_um(substrate::ellipses_of(cell.adhesions), forces_nN, gel, threads);
   const auto assumed = [](const Adhesion& a) { return is_assumed(a.origin); };
   if (std::ranges::none_of(cell.adhesions, assumed) || fit.data.position_um.empty()) return under;
-  std::vector<Vec3> places_um;
-  for (const Vec2 p : fit.data.position_um) places_um.push_back({p.x, p.y, 0});
   constexpr double kCell_um = 1;
-  const numerics::Near beads(std::move(places_um), kCell_um);
+  const numerics::Near beads(places_of_beads(fit.data), kCell_um);
   const VectorXd moved_um = moved_by(fit.data, forces_nN);
+  const Index each = fit.data.dimension;
   for (Index a = 0; a < std::ssize(cell.adhesions); ++a)
-    if (assumed(cell.adhesions[a])) under.segment<2>(2 * a) = shown_by_beads_um(beads, moved_um, cell.adhesions[a]);
+    if (assumed(cell.adhesions[a]))
+      under.segment(each * a, each) = shown_by_beads_um(beads, moved_um, cell.adhesions[a]);
   return under;
 }
 
@@ -275,12 +277,12 @@ double standard_error(const EnsembleFit& fit, const VectorXd& gradient) {
 Figures moments_of(const EnsembleFit& fit, const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN) {
   const Vec2 centre = centre_of(ellipses, &substrate::Ellipse::centre_um);
   Eigen::Matrix2d moment = Eigen::Matrix2d::Zero();
-  VectorXd of_trace(forces_nN.size());
+  VectorXd of_trace = VectorXd::Zero(forces_nN.size());
   for (Index a = 0; a < std::ssize(ellipses); ++a) {
     const Vec2 arm = ellipses[a].centre_um - centre;
     const Eigen::Vector2d x(arm.x, arm.y);
-    moment -= x * forces_nN.segment<2>(2 * a).transpose();
-    of_trace.segment<2>(2 * a) = -x;
+    moment -= x * forces_nN.segment<2>(fit.data.dimension * a).transpose();
+    of_trace.segment<2>(fit.data.dimension * a) = -x;
   }
   const auto [sizes, axes] = numerics::symmetric_eigen(0.5 * (moment + moment.transpose()));
   const Eigen::Vector2d major = axes.col(1);
@@ -316,32 +318,29 @@ bool is_far(Vec2 bead_um, const Polygon& outline_um, double far_distance_um) {
   return !contains(outline_um, bead_um) && distance_to_boundary_um(outline_um, bead_um) >= far_distance_um;
 }
 
-/// What lies beside another cell is no witness of rest.
-bool is_used(const LinearData& data, std::size_t bead) { return data.weight_per_um[2 * static_cast<Index>(bead)] > 0; }
-
 }  // namespace
 
 bool has_far_beads(const LinearData& data, const Polygon& outline_um, double far_distance_um) {
   constexpr int kFewest = 30;
   int n = 0;
-  for (std::size_t b = 0; b < data.position_um.size(); ++b)
+  for (Index b = 0; b < std::ssize(data.position_um); ++b)
     n += is_used(data, b) && is_far(data.position_um[b], outline_um, far_distance_um);
   return n >= kFewest;
 }
 
-NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const VectorXd& forces_nN,
-                       const Polygon& outline_um, double far_distance_um) {
-  const VectorXd residual = residual_um(data, forces_nN);
+NoiseLevel noise_level(const LinearData& data, const VectorXd& forces_nN, const Polygon& outline_um,
+                       double far_distance_um) {
+  const VectorXd residual = evened_residual_um(data, forces_nN);
+  const Index each = data.dimension;
   const bool has_far = has_far_beads(data, outline_um, far_distance_um);
   std::vector<double> used;
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    if (!is_used(data, i)) continue;
-    if (has_far && !is_far(beads[i].position_um, outline_um, far_distance_um)) continue;
-    const auto row = 2 * static_cast<Index>(i);
-    for (const double r : {residual[row], residual[row + 1]}) used.push_back(std::abs(r));
+  for (Index row = 0; row < residual.size(); ++row) {
+    if (!is_used(data, row / each)) continue;  // beside another cell it is no witness of rest
+    if (has_far && !is_far(data.position_um[row / each], outline_um, far_distance_um)) continue;
+    used.push_back(std::abs(residual[row]));
   }
   if (used.empty()) return {};
-  const std::string source = std::to_string(used.size() / 2) +
+  const std::string source = std::to_string(std::ssize(used) / each) +
                              (has_far ? " beads far from the cell" : " beads, too few of them far from the cell");
   return {.sigma_um = 1.4826 * numerics::median_in(used), .source = source};
 }

@@ -52,7 +52,8 @@ void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<A
 ///                            (an anchor, a candidate) the size is assumed, and half of this energy with it: there u is
 ///                            that of the beads on it, or of the nearest four. A tighter load has more, unseen
 ///   contractile_moment_nN_um −tr P, P = Σ x Fᵀ symmetrised, about the adhesions' centre: positive where the cell
-///                            contracts; its two parts along the axes of P, and the angle of the larger one
+///                            contracts; its two parts along the axes of P, and the angle of the larger one; in space
+///                            of what acts along the surface
 ///
 /// The energy is that of the exact layer of the gel's thickness and modulus; without it where the modulus changes with
 /// depth. No moments where the image cuts the cell: the forces beyond the cut are part of them.
@@ -65,13 +66,13 @@ Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& 
 bool has_far_beads(const LinearData& data, const Polygon& outline_um, double far_distance_um);
 
 struct NoiseLevel {
-  double sigma_um = 0;  ///< standard deviation of a component
+  double sigma_um = 0;  ///< standard deviation of a component along the surface
   std::string source;
 };
 
 /// From what the model leaves unexplained at beads further than `far_distance_um` outside the outline: 1.4826 × the
 /// median magnitude of a component, which outliers do not move. Without far beads: of all beads.
-NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const VectorXd& forces_nN,
-                       const Polygon& outline_um, double far_distance_um);
+NoiseLevel noise_level(const LinearData& data, const VectorXd& forces_nN, const Polygon& outline_um,
+                       double far_distance_um);
 
 }  // namespace mbtfm::tensions

@@ -104,6 +104,17 @@ Index n_unexpected(const Motions& motions) { return motions.shapes.cols() - (mot
 
 }  // namespace
 
+Vec3 place_of_bead(const LinearData& data, Index bead) {
+  const auto& [x, y] = data.position_um[bead];
+  return {x, y, data.height_um.empty() ? 0 : -data.height_um[bead]};
+}
+
+std::vector<Vec3> places_of_beads(const LinearData& data) {
+  std::vector<Vec3> places_um;
+  for (Index b = 0; b < std::ssize(data.position_um); ++b) places_um.push_back(place_of_bead(data, b));
+  return places_um;
+}
+
 LinearData reduce(const DisplacementField& beads, MatrixXd compliance_um_per_nN, const std::vector<bool>& is_used) {
   return reduce(beads, substrate::dense_response(std::move(compliance_um_per_nN)), is_used);
 }
@@ -205,6 +216,16 @@ MatrixXd less_motion(const LinearData& data, MatrixXd displacements) {
 VectorXd residual_um(const LinearData& data, const VectorXd& forces_nN) {
   return less_motion(data, data.displacement_um - data.response->displace(forces_nN));
 }
+
+VectorXd evened_residual_um(const LinearData& data, const VectorXd& forces_nN) {
+  VectorXd residual = residual_um(data, forces_nN);
+  for (Index row = 0; row < residual.size(); ++row)
+    if (const Index along_x = row - row % data.dimension; is_used(data, row / data.dimension))
+      residual[row] *= data.weight_per_um[row] / data.weight_per_um[along_x];
+  return residual;
+}
+
+bool is_used(const LinearData& data, Index bead) { return data.weight_per_um[data.dimension * bead] > 0; }
 
 LinearData reweighted(LinearData data, const VectorXd& bead_weight) {
   data.bead_weight = bead_weight;

@@ -16,6 +16,10 @@
 
 namespace mbtfm::tensions {
 
+/// Of so many components as `dimension` has: a force, a displacement, a way; and what maps one to another.
+using ShortVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
+using ShortMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
+
 /// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best (and what
 /// is expected of their sizes counts: aᵀΛa is part of the left side).
 /// White noise of W u is white in y.
@@ -50,6 +54,7 @@ Motions joined_ahead(const Motions& those, Index n_last, const Motions& these);
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   std::vector<double> height_um = {};  ///< of the beads, in space; empty: all alike
+  std::vector<double> held_um = {};    ///< height at which each adhesion is pulled at, in space; empty: 0
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
   MatrixXd balance;          ///< 2·adhesions × sums that are zero where all forces balance; empty: not known
   VectorXd displacement_um;  ///< u: 2·beads, in the same order, less the offset
@@ -63,6 +68,10 @@ struct LinearData {
   Index dimension = 2;      ///< components of a force, and of a bead's displacement
   ReducedData reduced;      ///< of all that, bead_weight included
 };
+
+/// In space, z into the gel.
+Vec3 place_of_bead(const LinearData& data, Index bead);
+std::vector<Vec3> places_of_beads(const LinearData& data);
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
 /// @param response  2·beads × 2·adhesions
@@ -111,6 +120,10 @@ std::optional<OwnForces> own_forces_in(const LinearData& data);
 MatrixXd less_motion(const LinearData& data, MatrixXd displacements);
 /// What forces and motions leave: P (u − G R), um, 2·beads.
 VectorXd residual_um(const LinearData& data, const VectorXd& forces_nN);
+/// The same with each component over its standard error, times that along x: microscopes see worse along z.
+VectorXd evened_residual_um(const LinearData& data, const VectorXd& forces_nN);
+/// Whether the bead counts at all.
+bool is_used(const LinearData& data, Index bead);
 
 /// W² and the weights by bead: 2·beads.
 VectorXd squared_weights(const LinearData& data);

@@ -1,10 +1,10 @@
 #include "mbtfm/tensions/missing_adhesions.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
 #include "mbtfm/tensions/common_motion.h"
@@ -15,7 +15,6 @@
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/near.h"
 #include "pipeline/numerics/parallel.h"
-#include "substrate/greens/half_space.h"
 #include "substrate/greens/models.h"
 
 namespace mbtfm::tensions {
@@ -27,30 +26,38 @@ constexpr double kDisc_um = 0.5;  // radius of an ordinary adhesion
 constexpr double kReach_um = 6;   // of the beads asked: beyond, a force's field is that of many others
 constexpr double kApart_um = 1;   // from an adhesion's rim: nearer, the adhesion's own force explains it
 
-/// Displacement around a disc that is pulled, by distance: along the pull's component towards the bead, and across.
+substrate::Ellipse disc_at(Vec2 place_um) {
+  return {.centre_um = place_um, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0};
+}
+
+/// Displacement around a disc that is pulled, by distance and, in space, depth.
 class DiscField {
  public:
-  explicit DiscField(const Gel& gel) {
-    const greens::HalfSpaceEllipse disc(
-        gel, {.centre_um = {}, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
-    for (std::size_t i = 0; i < table_.size(); ++i) {
-      const greens::Sym2 g = disc.compliance_um_per_nN({kReach_um * static_cast<double>(i) / kLast, 0});
-      table_[i] = {g.xx, g.yy};
-    }
+  DiscField(const Gel& gel, Index dimension) {
+    std::vector<Vec3> lattice_um;
+    for (int k = 0; k <= (dimension > 2 ? kDepths : 0); ++k)
+      for (int i = 0; i <= kLast; ++i) lattice_um.push_back({kReach_um * i / kLast, 0, kReach_um * k / kDepths});
+    const auto half_space = greens::make_greens(gel, {.model = substrate::ModelKind::half_space}, 1);
+    table_ = response_to({disc_at({})}, lattice_um, dimension, *half_space)->matrix();
   }
-  Eigen::Matrix2d at(Vec2 offset_um) const {
-    const double r = std::sqrt(dot(offset_um, offset_um)), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
-    const auto i = static_cast<std::size_t>(place);
+  ShortMatrix at(const Vec3& offset_um) const {
+    const double r = std::sqrt(offset_um.x * offset_um.x + offset_um.y * offset_um.y);
+    const double place = std::min(r / kReach_um * kLast, kLast - 1e-9);
+    const auto nearest = static_cast<Index>(std::lround(std::min(offset_um.z / kReach_um, 1.0) * kDepths));
+    const auto i = static_cast<Index>(place);
+    const Index each = table_.cols(), row = each * ((kLast + 1) * nearest + i);
     const double share = place - static_cast<double>(i);
-    const Vec2 along_across = (1 - share) * table_[i] + share * table_[i + 1];
-    if (r <= 0) return along_across.x * Eigen::Matrix2d::Identity();
-    const Eigen::Vector2d e(offset_um.x / r, offset_um.y / r);
-    return along_across.y * Eigen::Matrix2d::Identity() + (along_across.x - along_across.y) * e * e.transpose();
+    const ShortMatrix along_x =
+        (1 - share) * table_.middleRows(row, each) + share * table_.middleRows(row + each, each);
+    ShortMatrix turn = ShortMatrix::Identity(each, each);
+    if (r > 0) turn.topLeftCorner<2, 2>() << offset_um.x / r, -offset_um.y / r, offset_um.y / r, offset_um.x / r;
+    return turn * along_x * turn.transpose();
   }
 
  private:
-  static constexpr double kLast = 240;  // 25 nm apart
-  std::array<Vec2, 241> table_;
+  static constexpr int kLast = 240;   // 25 nm apart
+  static constexpr int kDepths = 60;  // 0.1 um: of the disc's radius a fifth
+  MatrixXd table_;
 };
 
 /// The beads in use.
@@ -59,9 +66,9 @@ class UsedBeads {
   explicit UsedBeads(const LinearData& data) {
     std::vector<Vec3> places;
     for (Index b = 0; b < std::ssize(data.position_um); ++b) {
-      if (data.weight_per_um[2 * b] <= 0) continue;
+      if (!is_used(data, b)) continue;
       beads_.push_back(b);
-      places.push_back({data.position_um[b].x, data.position_um[b].y, 0});
+      places.push_back(place_of_bead(data, b));
     }
     near_ = numerics::Near(std::move(places), kReach_um);
   }
@@ -85,25 +92,27 @@ struct Asked {
 
 Asked ask(Vec2 place_um, const UsedBeads& used, const DiscField& disc, const LinearData& data, const VectorXd& weight,
           const VectorXd& residual, double variance) {
-  constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
+  constexpr std::size_t kFewest = 10;  // beads for two or three numbers and their mean
   const std::vector<Index> beads = used.near(place_um);
   if (beads.size() < kFewest) return {place_um};
-  std::vector<Eigen::Matrix2d> fields;
-  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero(), square = mean;
-  Eigen::Vector2d score = Eigen::Vector2d::Zero();
-  double all = 0;
+  const Index each = data.dimension;
+  std::vector<ShortMatrix> fields;
+  ShortMatrix mean = ShortMatrix::Zero(each, each), square = mean;
+  ShortVector score = ShortVector::Zero(each), all = score;
   for (const Index b : beads) {
-    fields.push_back(disc.at(data.position_um[b] - place_um));
-    mean += weight[2 * b] * fields.back();
-    all += weight[2 * b];
+    const ShortVector of_bead = weight.segment(each * b, each);
+    fields.push_back(disc.at(place_of_bead(data, b) - Vec3{place_um.x, place_um.y, 0}));
+    mean += of_bead.asDiagonal() * fields.back();
+    all += of_bead;
   }
+  mean = all.cwiseInverse().asDiagonal() * mean;
   for (std::size_t k = 0; k < beads.size(); ++k) {
-    const Index row = 2 * beads[k];
-    const Eigen::Matrix2d field = fields[k] - mean / all;
-    score += weight[row] * field * residual.segment<2>(row);
-    square += weight[row] * field * field;
+    const Index row = each * beads[k];
+    const ShortMatrix field = fields[k] - mean, weighted = weight.segment(row, each).asDiagonal() * field;
+    score += weighted.transpose().lazyProduct(residual.segment(row, each));
+    square += weighted.transpose().lazyProduct(field);
   }
-  return {place_um, score.dot(Eigen::Vector2d(numerics::solve_symmetric(square, score))) / variance};
+  return {place_um, score.dot(VectorXd(numerics::solve_symmetric(square, score))) / variance};
 }
 
 /// The best place within a step of this one.
@@ -137,11 +146,9 @@ std::vector<Vec2> free_ends(const Cell& cell) {
 std::vector<Vec2> free_places(const Cell& cell) {
   const auto [low, high] = extent_of(cell.outline_um);
   std::vector<Vec2> places;
-  for (double y = low.y; y <= high.y; y += kStep_um) {
-    for (double x = low.x; x <= high.x; x += kStep_um) {
+  for (double y = low.y; y <= high.y; y += kStep_um)
+    for (double x = low.x; x <= high.x; x += kStep_um)
       if (is_free(cell, {x, y})) places.push_back({x, y});
-    }
-  }
   return places;
 }
 
@@ -151,7 +158,7 @@ std::vector<Vec2> likely_places(const EnsembleFit& fit, const std::vector<Vec2>&
   constexpr double kLeast = 10;      // of the gain: chance has it at each hundred and fiftieth place
   constexpr std::size_t kMost = 25;  // of either: where so many fail, the model is wrong as a whole
   const UsedBeads beads(fit.data);
-  const DiscField disc(gel);
+  const DiscField disc(gel, fit.data.dimension);
   const VectorXd weight = squared_weights(fit.data);
   std::vector<Vec2> tried, likely;
   for (const VectorXd& forces_nN : {adhesion_forces_nN(fit), fit.forces.nN}) {
@@ -174,13 +181,12 @@ std::vector<Vec2> likely_places(const EnsembleFit& fit, const std::vector<Vec2>&
   return likely;
 }
 
-/// Displacement of the beads by forces on discs there, 2·beads × 2·places.
+/// Displacement of the beads by forces on discs there, components × components·places.
 MatrixXd displacement_by(const std::vector<Vec2>& places, const LinearData& data, const Gel& gel) {
   std::vector<substrate::Ellipse> discs;
-  for (const Vec2 place : places)
-    discs.push_back({.centre_um = place, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
-  return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
-      ->compliance_um_per_nN(data.position_um, discs);
+  for (const Vec2 place : places) discs.push_back(disc_at(place));
+  const auto layer = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads);
+  return response_to(discs, places_of_beads(data), data.dimension, *layer)->matrix();
 }
 
 /// By how much sums of magnitudes are too small as further adhesions are missed that are too weak to be found: as large
@@ -193,7 +199,8 @@ double unfound_nN(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesi
   for (const MissingAdhesion& place : found) weakest_nN = std::min(weakest_nN, norm(place.force_nN));
   for (std::size_t a = 0; a < adhesions.size(); ++a) {
     if (adhesions[a].origin == AdhesionOrigin::beads) continue;
-    const Eigen::Vector2d force = forces_nN.segment<2>(2 * static_cast<Index>(a));
+    const Index each = forces_nN.size() / std::ssize(adhesions);
+    const ShortVector force = forces_nN.segment(each * static_cast<Index>(a), each);
     if (force.norm() >= weakest_nN) n_above += 1;
     if (force.norm() >= weakest_nN || force.norm() <= 0) continue;
     double nearest_um = std::numeric_limits<double>::infinity(), cosine = 1;
@@ -201,7 +208,7 @@ double unfound_nN(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesi
       const double apart_um = norm(adhesions[b].position_um - adhesions[a].position_um);
       if (a == b || apart_um >= nearest_um) continue;
       nearest_um = apart_um;
-      cosine = force.normalized().dot(forces_nN.segment<2>(2 * static_cast<Index>(b)).normalized());
+      cosine = force.normalized().dot(forces_nN.segment(each * static_cast<Index>(b), each).normalized());
     }
     lacking_nN += (1 - cosine) * force.norm();
   }
@@ -212,9 +219,8 @@ double unfound_nN(const VectorXd& forces_nN, const std::vector<Adhesion>& adhesi
 
 bool is_free(const Cell& cell, Vec2 place_um) {
   if (!contains(cell.outline_um, place_um)) return false;
-  for (const Polygon& hole : cell.holes_um) {
+  for (const Polygon& hole : cell.holes_um)
     if (contains(hole, place_um)) return false;
-  }
   return std::ranges::none_of(cell.adhesions, [&](const Adhesion& a) {
     const Vec2 d = a.position_um - place_um;
     return dot(d, d) < std::pow(a.major_axis_um / 2 + kApart_um, 2);
@@ -239,8 +245,9 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cel
   const VectorXd forces_nN = adhesion_forces_nN(fit);
   const double kappa =
       std::max(1e-300, forces_nN.squaredNorm() / static_cast<double>(forces_nN.size())) / left.variance();
-  std::vector<std::vector<Index>> columns;
-  for (Index k = 0; k < std::ssize(likely); ++k) columns.push_back({2 * k, 2 * k + 1});
+  const Index each = fit.data.dimension;
+  std::vector<std::vector<Index>> columns(likely.size(), std::vector<Index>(each));
+  for (Index k = 0; k < std::ssize(likely); ++k) std::iota(columns[k].begin(), columns[k].end(), each * k);
   const std::vector<std::size_t> causes = causes_among(scores, columns, log_odds_against, kappa);
   if (causes.empty()) return {};
   std::vector<Index> of_causes;
@@ -250,12 +257,12 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Cel
   const VectorXd sizes = numerics::matvec(covariance, there.scores);  // over s
   std::vector<MissingAdhesion> found;
   for (std::size_t k = 0; k < causes.size(); ++k) {
-    const auto row = 2 * static_cast<Index>(k);
-    const Eigen::Vector2d size = sizes.segment<2>(row), force_nN = std::sqrt(left.variance()) * size;
+    const Index row = each * static_cast<Index>(k);
+    const VectorXd size = sizes.segment(row, each), force_nN = std::sqrt(left.variance()) * size;
     found.push_back(
         {.position_um = likely[causes[k]],
-         .force_nN = {force_nN.x(), force_nN.y()},
-         .chi_squared_gain = size.dot(numerics::solve_symmetric(covariance.block<2, 2>(row, row), size).col(0))});
+         .force_nN = {force_nN[0], force_nN[1]},
+         .chi_squared_gain = size.dot(numerics::solve_symmetric(covariance.block(row, row, each, each), size).col(0))});
   }
   std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
   return found;
@@ -283,9 +290,9 @@ EnsembleFit with_their_forces(EnsembleFit fit, std::vector<MissingAdhesion>& pla
   const MotionsBeside found = find_forces_beside(fit, displacement_by(there, fit.data, gel), n_last);
   fit.forces.away_nN2 = 0;
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const Eigen::Vector2d force = found.values.segment<2>(2 * static_cast<Index>(k)),
-                          sigma = found.sigma.segment<2>(2 * static_cast<Index>(k));
-    places[k].force_nN = {force.x(), force.y()};
+    const Index each = fit.data.dimension, row = each * static_cast<Index>(k);
+    const VectorXd force = found.values.segment(row, each), sigma = found.sigma.segment(row, each);
+    places[k].force_nN = {force[0], force[1]};
     places[k].chi_squared_gain = force.cwiseQuotient(sigma).squaredNorm();
     const double along = force.normalized().cwiseProduct(sigma).norm();
     fit.forces.away_nN2 += along * along;
@@ -322,11 +329,9 @@ Cell held_at(Cell cell, const std::vector<MissingAdhesion>& places) {
 std::vector<MissingAdhesion> with_forces_of(const Cell& cell, const VectorXd& forces_nN,
                                             std::vector<MissingAdhesion> held,
                                             const std::vector<MissingAdhesion>& further) {
-  Index at = 2 * std::ssize(cell.adhesions) - 2 * std::ssize(held);
-  for (MissingAdhesion& place : held) {
-    place.force_nN = {forces_nN[at], forces_nN[at + 1]};
-    at += 2;
-  }
+  const Index each = forces_nN.size() / std::max<Index>(1, std::ssize(cell.adhesions));
+  for (Index k = 0, at = forces_nN.size() - each * std::ssize(held); k < std::ssize(held); ++k, at += each)
+    held[k].force_nN = {forces_nN[at], forces_nN[at + 1]};
   held.insert(held.end(), further.begin(), further.end());
   std::ranges::stable_sort(held, std::greater(), &MissingAdhesion::chi_squared_gain);
   return held;

@@ -17,14 +17,32 @@ namespace mbtfm::tensions {
 
 namespace {
 
-/// Forces at these places of fibres between two of them each, of tension 1: 2·places × pairs.
-MatrixXd chords(const std::vector<Vec2>& places_um, const std::vector<std::array<std::size_t, 2>>& pairs) {
-  MatrixXd forces = MatrixXd::Zero(2 * std::ssize(places_um), std::ssize(pairs));
+/// Where the adhesions are pulled at: components × adhesions.
+MatrixXd places_of(const std::vector<Adhesion>& adhesions, const LinearData& data) {
+  MatrixXd places_um(data.dimension, std::ssize(adhesions));
+  for (Index a = 0; a < places_um.cols(); ++a) {
+    const auto& [x, y] = adhesions[a].position_um;
+    places_um.col(a) = Eigen::Vector3d(x, y, data.held_um.empty() ? 0 : -data.held_um[a]).head(data.dimension);
+  }
+  return places_um;
+}
+
+using Pair = std::array<std::size_t, 2>;  ///< of adhesions, by their place in the list
+
+/// From one to the other.
+ShortVector direction_of(const Pair& pair, const MatrixXd& places_um) {
+  ShortVector chord = places_um.col(static_cast<Index>(pair[1])) - places_um.col(static_cast<Index>(pair[0]));
+  chord.normalize();
+  return chord;
+}
+
+/// Forces at these places of fibres between two of them each, of tension 1: components·places × pairs.
+MatrixXd chords(const MatrixXd& places_um, const std::vector<Pair>& pairs) {
+  MatrixXd forces = MatrixXd::Zero(places_um.size(), std::ssize(pairs));
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const auto [a, b] = pairs[k];
-    const Vec2 chord = places_um[b] - places_um[a], unit = (1 / norm(chord)) * chord;
-    forces.col(static_cast<Index>(k)).segment<2>(2 * static_cast<Index>(a)) << unit.x, unit.y;
-    forces.col(static_cast<Index>(k)).segment<2>(2 * static_cast<Index>(b)) << -unit.x, -unit.y;
+    auto by_place = forces.col(static_cast<Index>(k)).reshaped(places_um.rows(), places_um.cols());
+    by_place.col(static_cast<Index>(pairs[k][0])) = direction_of(pairs[k], places_um);
+    by_place.col(static_cast<Index>(pairs[k][1])) = -direction_of(pairs[k], places_um);
   }
   return forces;
 }
@@ -108,7 +126,7 @@ Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
       const VectorXd row = block.row(k).transpose().cwiseProduct(own_error) / standard_error;
       VectorXd by_bead(n_beads);
       for (Index b = 0; b < n_beads; ++b) {
-        by_bead[b] = row.segment<2>(2 * b).squaredNorm();
+        by_bead[b] = row.segment(data.dimension * b, data.dimension).squaredNorm();
         if (by_bead[b] <= largest[b]) continue;
         largest[b] = by_bead[b];
         influence.most_informed[b] = fit.tensions.fibre_ids[i];
@@ -147,8 +165,7 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
   std::vector<FibreLeftOut> fibres;
   for (Index i = 1; i < static_cast<Index>(fit.tensions.fibre_ids.size()); ++i) {
-    FibreLeftOut left{
-        .fibre_id = fit.tensions.fibre_ids[i], .chi_squared_rise = 0, .aic_rise = 0, .n_informing_beads = 0};
+    FibreLeftOut left{.fibre_id = fit.tensions.fibre_ids[i], .n_informing_beads = influence.n_informing_beads[i]};
     for (const MeshFit& mesh : fit.meshes) {
       // Where t_i is held to t_0, 2 Phi rises by (t_i − t_0)² / Var(t_i − t_0), Var in units of the noise.
       const MatrixXd& c = mesh.covariance_nN2;
@@ -158,7 +175,6 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
       left.chi_squared_rise += difference * difference / variance / static_cast<double>(fit.meshes.size());
     }
     left.aic_rise = left.chi_squared_rise - 2;
-    left.n_informing_beads = influence.n_informing_beads[i];
     fibres.push_back(left);
   }
   return fibres;
@@ -166,9 +182,7 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 
 LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adhesions,
                                const std::vector<MissingFibre>& fibres, Index n_last) {
-  std::vector<Vec2> places_um;
-  for (const Adhesion& a : adhesions) places_um.push_back(a.position_um);
-  std::vector<std::array<std::size_t, 2>> pairs;
+  std::vector<Pair> pairs;
   VectorXd tensions_nN(std::ssize(fibres));
   for (std::size_t k = 0; k < fibres.size(); ++k) {
     pairs.push_back({place_of(fibres[k].start_adhesion_id, adhesions), place_of(fibres[k].end_adhesion_id, adhesions)});
@@ -176,7 +190,7 @@ LinearData with_missing_fibres(LinearData data, const std::vector<Adhesion>& adh
   }
   // Ten times what was found bounds nothing, but forces along these pairs are then no direction without any meaning.
   constexpr double kAnySize = 10;
-  const MatrixXd forces = chords(places_um, pairs);
+  const MatrixXd forces = chords(places_of(adhesions, data), pairs);
   Motions motions = joined_ahead(data.motions, n_last,
                                  {.shapes = data.response->displace(forces),
                                   .precision = (kAnySize * tensions_nN).cwiseAbs2().cwiseInverse(),
@@ -189,10 +203,10 @@ VectorXd segmentation_variance_nN2(const VectorXd& forces_nN, const std::vector<
   VectorXd variance(forces_nN.size());
   const double turn_rad = errors.adhesion_angle_error_deg * std::numbers::pi / 180;
   for (std::size_t a = 0; a < adhesions.size(); ++a) {
-    const auto row = 2 * static_cast<Index>(a);
+    const Index each = forces_nN.size() / std::ssize(adhesions), row = each * static_cast<Index>(a);
     const double shift = errors.adhesion_shift_error_um / substrate::ellipse_of(adhesions[a]).semi_minor_um;
     const double share = std::hypot(shift, errors.adhesion_area_error / 2, turn_rad);
-    variance.segment<2>(row).setConstant(share * share * forces_nN.segment<2>(row).squaredNorm());
+    variance.segment(row, each).setConstant(share * share * forces_nN.segment(row, each).squaredNorm());
   }
   return variance;
 }
@@ -202,10 +216,8 @@ namespace {
 /// Fibres from adhesion to adhesion, all found together: what the beads show of each, given the others.
 class FibresTogether {
  public:
-  using Pair = std::array<std::size_t, 2>;  ///< of adhesions, by their place in the list
-
   /// @param K, q  curvature and slope of the misfit by the forces on these adhesions, in units of the noise
-  FibresTogether(std::vector<Vec2> places_um, MatrixXd K, VectorXd q)
+  FibresTogether(MatrixXd places_um, MatrixXd K, VectorXd q)
       : places_um_(std::move(places_um)), K_(std::move(K)), q_(std::move(q)) {}
 
   struct FittedPairs {
@@ -251,7 +263,7 @@ class FibresTogether {
   }
 
  private:
-  std::vector<Vec2> places_um_;
+  MatrixXd places_um_;
   MatrixXd K_;
   VectorXd q_;
 };
@@ -270,53 +282,45 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
                                   : VectorXd(),
                   variance, threads);
   const VectorXd& q = left.force_scores();
+  const Index each = fit.data.dimension;
+  const MatrixXd places_um = places_of(adhesions, fit.data);
 
-  std::vector<MissingFibre> found;
-  std::vector<Eigen::Matrix2d> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
+  std::vector<std::pair<double, Pair>> found;      // by how much less misfit each alone would leave
+  std::vector<ShortMatrix> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
   left.for_each_block([&](Index first, const MatrixXd& K) {
-    for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Index>(b) < K.rows(); ++b) {
-      const auto j = 2 * static_cast<Index>(b);
-      own[b] = K.block<2, 2>(j, j - first).selfadjointView<Eigen::Upper>();
+    for (auto b = static_cast<std::size_t>(first / each); each * static_cast<Index>(b) < K.rows(); ++b) {
+      const auto j = each * static_cast<Index>(b);
+      own[b] = K.block(j, j - first, each, each).selfadjointView<Eigen::Upper>();
       if (adhesions[b].origin == AdhesionOrigin::beads) continue;  // the last ones
       for (std::size_t a = 0; a < b; ++a) {
-        const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
-        const Vec2 unit = (1 / norm(chord)) * chord;
-        const Eigen::Vector2d e(unit.x, unit.y);  // the fibre pulls a towards b, and b towards a
-        const auto i = 2 * static_cast<Index>(a);
-        const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
-        const double curvature = e.dot((own[a] + own[b]) * e) - 2 * e.dot(K.block<2, 2>(i, j - first) * e);
+        const ShortVector e = direction_of({a, b}, places_um);  // the fibre pulls a towards b, and b towards a
+        const auto i = each * static_cast<Index>(a);
+        const ShortMatrix between = K.block(i, j - first, each, each);
+        const double slope = e.dot(q.segment(i, each) - q.segment(j, each));
+        const double curvature = e.dot((own[a] + own[b]) * e) - 2 * e.dot(between * e);
         if (slope <= 0 || curvature <= 0) continue;
         const double gain = slope * slope / curvature / variance;
         if (gain < limit * limit) continue;
-        found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
-                         .end_adhesion_id = adhesions[b].adhesion_id,
-                         .tension_nN = slope / curvature,
-                         .chi_squared_gain = gain});
+        found.push_back({gain, {a, b}});
       }
     }
   });
-  std::stable_sort(found.begin(), found.end(), [](const MissingFibre& x, const MissingFibre& y) {
-    return x.chi_squared_gain > y.chi_squared_gain;
-  });
+  std::ranges::stable_sort(found, std::greater(), &std::pair<double, Pair>::first);
   if (found.empty()) return {};
-  using Pair = FibresTogether::Pair;
   std::vector<std::size_t> ends;  // adhesions, each once: two for each fibre
   const auto is_end = [&](std::size_t a) { return std::ranges::find(ends, a) != ends.end(); };
-  for (const MissingFibre& f : found) {
-    if (ends.size() == 2 * kMostMissingFibres) break;
-    const std::size_t a = place_of(f.start_adhesion_id, adhesions), b = place_of(f.end_adhesion_id, adhesions);
-    if (!is_end(a) && !is_end(b)) ends.insert(ends.end(), {a, b});
-  }
+  for (const auto& [gain, pair] : found)
+    if (ends.size() < 2 * kMostMissingFibres && !is_end(pair[0]) && !is_end(pair[1]))
+      ends.insert(ends.end(), pair.begin(), pair.end());
   std::vector<Index> components;
-  std::vector<Vec2> places_um;
   std::vector<Pair> pairs;
   for (std::size_t k = 0; k < ends.size(); ++k) {
-    for (const Index c : {0, 1}) components.push_back(2 * static_cast<Index>(ends[k]) + c);
-    places_um.push_back(adhesions[ends[k]].position_um);
+    for (Index c = 0; c < each; ++c) components.push_back(each * static_cast<Index>(ends[k]) + c);
     if (k % 2 == 1) pairs.push_back({k - 1, k});
   }
   const Scores there = left.scores_of(components);
-  const FibresTogether together(std::move(places_um), there.information / variance, there.scores / std::sqrt(variance));
+  const FibresTogether together(places_um(Eigen::all, ends), there.information / variance,
+                                there.scores / std::sqrt(variance));
   FibresTogether::FittedPairs fitted = together.with_best_partners(std::move(pairs));
   const auto gains = [&] { return VectorXd(fitted.tension_nN.cwiseQuotient(fitted.sigma_nN).cwiseAbs2()); };
   for (Index least = 0; !fitted.pairs.empty() && gains().minCoeff(&least) < limit * limit;) {

@@ -152,14 +152,11 @@ MatrixXd root_of(const MatrixXd& covariance) {
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
 bool stands_alone(const LinearData& data, const VectorXd& residual, Index row) {
   const Index each = data.dimension;
-  const auto height_um = [&](Index bead) { return data.height_um.empty() ? 0 : data.height_um[bead]; };
   const auto own = residual.segment(row, each);
   double nearest = std::numeric_limits<double>::infinity(), along = 0;
   for (Index other = 0; other < residual.size(); other += each) {
     if (other == row || data.weight_per_um[other] == 0) continue;
-    const Index a = other / each, b = row / each;
-    const Vec2 aside = data.position_um[a] - data.position_um[b];
-    const double distance = norm(Vec3{aside.x, aside.y, height_um(a) - height_um(b)});
+    const double distance = norm(place_of_bead(data, other / each) - place_of_bead(data, row / each));
     if (distance >= nearest) continue;
     nearest = distance;
     along = residual.segment(other, each).dot(own);

@@ -10,14 +10,23 @@
 #include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/triangle.h"
 #include "substrate/greens/models.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::tensions {
 
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
+                                    Index dimension, const substrate::Substrate& gel) {
+  const substrate::Loads loads{ellipses, static_cast<int>(dimension)};
+  if (dimension > 2) return gel.response(loads, {places_um, substrate::Components::all});
+  std::vector<Vec2> along_um;
+  for (const Vec3& place : places_um) along_um.push_back({place.x, place.y});
+  return gel.response(loads, {along_um});
+}
+
 MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
-    compliance_um_per_nN.middleCols<2>(2 * static_cast<Index>(i)) *= side_um;
-  }
+  const Index each = compliance_um_per_nN.cols() / std::max<Index>(1, std::ssize(places));
+  for (Index i = 0; i < std::ssize(places); ++i)
+    compliance_um_per_nN.middleCols(each * i, each) *= std::sqrt(std::numbers::pi) * places[i].semi_major_um;
   return compliance_um_per_nN;
 }
 
@@ -223,13 +232,16 @@ std::vector<Polygon> neighbours_beyond_border(const LinearData& data, const Cell
   for (const Piece& piece : pieces) {
     const std::vector<substrate::Ellipse> own = discs_on(piece);
     std::vector<Index>& of_piece = columns.emplace_back();
-    for (std::size_t k = 0; k < 2 * own.size(); ++k) of_piece.push_back(2 * std::ssize(discs) + static_cast<Index>(k));
+    for (Index k = 0; k < data.dimension * std::ssize(own); ++k)
+      of_piece.push_back(data.dimension * std::ssize(discs) + k);
     discs.insert(discs.end(), own.begin(), own.end());
   }
   // a layer's tables would take longer than all the rest, and the field of random forces is as smooth
   const auto half_space = greens::make_greens(gel, {.model = substrate::ModelKind::half_space}, data.threads);
   Scores scores =
-      pattern_of(data, by_root_of_area(half_space->compliance_um_per_nN(data.position_um, discs), discs)).beyond;
+      pattern_of(data, by_root_of_area(response_to(discs, places_of_beads(data), data.dimension, *half_space)->matrix(),
+                                       discs))
+          .beyond;
   const double variance = variance_beside(data, scores);
   // Simulated beads without noise: what is left is rounding, and has a shape.
   constexpr double kRounding = 1e-6;  // of the displacement: tables have nine digits, models five and more

@@ -16,13 +16,17 @@
 #include "mbtfm/tensions/linear_data.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/gel.h"
-#include "substrate/ellipse.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::tensions {
 
 struct EnsembleFit;
 
-/// Of each place the displacement by forces of 1 nN/um times the root of its area: 2·beads × 2·places.
+/// How these places answer to forces on the ellipses, by a model of the gel, which must outlive it.
+substrate::LazyResponse response_to(const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec3>& places_um,
+                                    Index dimension, const substrate::Substrate& gel);
+
+/// Of each place the displacement by forces of 1 nN/um times the root of its area: components × components·places.
 MatrixXd by_root_of_area(MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places);
 
 struct Scores {

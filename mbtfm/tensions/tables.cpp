@@ -60,12 +60,9 @@ Table<FitOfFrame> frame_fit_table() {
 std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit) {
   const MatrixXd correlation = correlation_of(fit);
   std::vector<CorrelationRow> rows;
-  for (std::size_t i = 0; i < fit.tensions.fibre_ids.size(); ++i) {
-    for (std::size_t j = i + 1; j < fit.tensions.fibre_ids.size(); ++j) {
-      rows.push_back({fit.tensions.fibre_ids[i], fit.tensions.fibre_ids[j],
-                      correlation(static_cast<Index>(i), static_cast<Index>(j))});
-    }
-  }
+  const std::vector<int>& ids = fit.tensions.fibre_ids;
+  for (Index i = 0; i < std::ssize(ids); ++i)
+    for (Index j = i + 1; j < std::ssize(ids); ++j) rows.push_back({ids[i], ids[j], correlation(i, j)});
   return rows;
 }
 

@@ -325,8 +325,9 @@ void divide_into(const MatrixXd& U, MatrixXd& R, int threads) {
 void for_each_gram_block(const MatrixXd& U, int threads, const std::function<void(Index, const MatrixXd&)>& body) {
   const int n = static_cast<int>(U.rows());
   MBTFM_ASSERT(U.cols() == n);
-  for (int first = 0; first < n; first += kPanel) {
-    const int size = std::min(kPanel, n - first), rows = first + size;
+  constexpr int kWhole = kPanel - kPanel % 6;  // forces, of two or three components
+  for (int first = 0; first < n; first += kWhole) {
+    const int size = std::min(kWhole, n - first), rows = first + size;
     MatrixXd block(rows, size);
     over_strips(rows, threads, [&](int begin, int count) {
       const int depth = begin + count;  // of these columns

@@ -123,7 +123,6 @@ ModelErrors model_errors(const Scene& scene, const KnownCell& cell, const Displa
                                            .data = fit.data,
                                            .networks = cell.networks,
                                            .cell = scene.cell.cell,
-                                           .beads = beads,
                                            .gel = scene.fit.gel,
                                            .substrate_error = 0,
                                            .lacks_base = false,

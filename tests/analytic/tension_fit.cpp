@@ -197,7 +197,7 @@ TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_what
                        .displacement_um = {x + (i < n_far && i % 10 == 0 ? astray : 0), y + (i < n_far ? 0 : 1)}});
     }
     const LinearData data = reduce(beads, Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 2));
-    return noise_level(beads, data, Eigen::VectorXd::Zero(2), outline, 10).sigma_um;
+    return noise_level(data, Eigen::VectorXd::Zero(2), outline, 10).sigma_um;
   };
   // The median of n magnitudes tells a standard deviation to 1.17 / sqrt(n); four of those.
   EXPECT_NEAR(of(10000, 0), kSigma_um, 4 * 1.17 / std::sqrt(20000.0) * kSigma_um);

@@ -15,25 +15,17 @@ void move(DisplacementField& beads, const AffineMotion& motion) {
   for (Bead& bead : beads) bead.displacement_um += motion.at(bead.position_um);
 }
 
-LinearData with_motions(const TensionScene& scene, const DisplacementField& beads) {
-  return reduce(beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(beads));
-}
-
 EnsembleFit fit_of(const TensionScene& scene, const LinearData& data, Loss loss = Loss::squares) {
-  FitParameters parameters;
-  parameters.loss = loss;
-  std::vector<cables::CableNetwork> networks;
-  networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-  return fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1);
+  return test::fit_to(data, scene, {.loss = loss});
 }
 
 TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
   const TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
   for (const Loss loss : {Loss::squares, Loss::huber}) {
-    const LinearData still = with_motions(scene, scene.beads);
+    const LinearData still = test::with_motions(scene, scene.beads);
     DisplacementField moved_beads = scene.beads;
     move(moved_beads, kMotion);
-    const LinearData moved = with_motions(scene, moved_beads);
+    const LinearData moved = test::with_motions(scene, moved_beads);
     const EnsembleFit a = fit_of(scene, still, loss), b = fit_of(scene, moved, loss);
     const double scale = values_of(a).norm();
     EXPECT_LE((values_of(a) - values_of(b)).norm(), 1e-6 * scale) << name_of(loss);  // where iterations end
@@ -47,7 +39,8 @@ TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
 TEST(CommonMotion, without_allowing_for_it_growth_is_taken_for_force) {
   TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
   move(scene.beads, {.growth = 0.003});
-  const LinearData blind = reduce(scene.beads, scene.compliance_um_per_nN), seeing = with_motions(scene, scene.beads);
+  const LinearData blind = reduce(scene.beads, scene.compliance_um_per_nN),
+                   seeing = test::with_motions(scene, scene.beads);
   const double truth = total_nN(scene.forces_nN);
   const EnsembleFit a = fit_of(scene, blind), b = fit_of(scene, seeing);
   EXPECT_GT(std::abs(a.total_force_nN.value - truth), 5 * a.total_force_nN.standard_error);
@@ -61,9 +54,9 @@ TEST(CommonMotion, what_was_planted_is_found_within_its_stated_error) {
   for (unsigned draw = 1; draw <= kDraws; ++draw) {
     test::measure(scene, 0.05, draw);
     move(scene.beads, kMotion);
-    const LinearData data = with_motions(scene, scene.beads);
+    const LinearData data = test::with_motions(scene, scene.beads);
     const EnsembleFit fit = fit_of(scene, data);
-    const FoundMotion found = common_motion_among(motions_beside(data, fit), data.position_um);
+    const FoundMotion found = common_motion_among(motions_beside(data, fit), data);
     const AffineMotion& m = found.motion;
     const Vec2 shift = m.shift - kMotion.at(m.centre);
     Eigen::VectorXd error(6);
@@ -81,8 +74,8 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
   double mean = 0;
   for (unsigned draw = 1; draw <= kDraws; ++draw) {
     test::measure(scene, 0.05, draw);
-    const LinearData data = with_motions(scene, scene.beads);
-    mean += curved_motion_beside(fit_of(scene, data), scene.beads).chi_squared / kDraws;
+    const LinearData data = test::with_motions(scene, scene.beads);
+    mean += curved_motion_beside(fit_of(scene, data)).chi_squared / kDraws;
   }
   EXPECT_NEAR(mean, 14, 4 * std::sqrt(2 * 14.0 / kDraws)) << "chi squared of 14 degrees of freedom";
   const double sigma_um = scene.beads.front().sigma_um;
@@ -96,8 +89,8 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
     squares += dot(bent, bent) / 400;
     bead.displacement_um += bent;
   }
-  const LinearData data = with_motions(scene, scene.beads);
-  const CurvedMotion found = curved_motion_beside(fit_of(scene, data), scene.beads);
+  const LinearData data = test::with_motions(scene, scene.beads);
+  const CurvedMotion found = curved_motion_beside(fit_of(scene, data));
   EXPECT_GT(found.chi_squared, 36.1);
   EXPECT_GT(found.rms_um, 0.2 * std::sqrt(squares)) << "most of it is even growth, which is taken off";
   EXPECT_LT(found.rms_um, 2 * std::sqrt(squares));
@@ -106,7 +99,7 @@ TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
 TEST(CommonMotion, beads_that_a_contracting_cell_cannot_move_so_are_refused) {
   TensionScene scene = test::tension_scene("case_21", 400, 0.05, 1);
   const auto start = [&](const DisplacementField& beads) {
-    const LinearData data = with_motions(scene, beads);
+    const LinearData data = test::with_motions(scene, beads);
     return uniform_start({scene.cables, data.reduced, scene.adhesion_ids});
   };
   EXPECT_NO_THROW(start(scene.beads));
@@ -120,7 +113,7 @@ TEST(CommonMotion, beads_that_a_contracting_cell_cannot_move_so_are_refused) {
 
 TEST(CommonMotion, reduced_data_are_those_of_the_projected_displacements) {
   const TensionScene scene = test::tension_scene("case_21", 50, 0.05, 7);
-  const LinearData data = reweighted(with_motions(scene, scene.beads), Eigen::VectorXd::LinSpaced(50, 0.1, 1));
+  const LinearData data = reweighted(test::with_motions(scene, scene.beads), Eigen::VectorXd::LinSpaced(50, 0.1, 1));
   const Eigen::VectorXd weight = squared_weights(data);
   const Eigen::MatrixXd& M = data.motions.shapes;
   const Eigen::MatrixXd P =
@@ -140,9 +133,9 @@ TEST(CommonMotion, of_beads_in_one_place_or_none_is_no_obstacle) {
   const TensionScene scene = test::tension_scene("case_21", 50, 0.05, 7);
   DisplacementField beads(scene.beads.begin(), scene.beads.end());
   for (Bead& bead : beads) bead.position_um = {3, 4};
-  const LinearData data = with_motions(scene, beads);
+  const LinearData data = test::with_motions(scene, beads);
   EXPECT_TRUE(data.reduced.target.allFinite());
-  EXPECT_EQ(affine_motions({}).rows(), 0);
+  EXPECT_EQ(affine_motions(DisplacementField{}).rows(), 0);
 }
 
 TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {

@@ -3,7 +3,11 @@
 
 #include <Eigen/Dense>
 
-#include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/missing_adhesions.h"
+#include "mbtfm/tensions/model_checks.h"
+#include "mbtfm/tensions/search.h"
 #include "substrate/loads.h"
 #include "tests/support/tension_scene.h"
 
@@ -29,6 +33,13 @@ class Ropes final : public network::Contractile {
   }
 
  private:
+  /// Its ropes keep their directions.
+  struct Rigid final : network::GeometryAnswer {
+    VectorXd none;
+    explicit Rigid(Eigen::Index n_sums) : none(VectorXd::Zero(n_sums)) {}
+    VectorXd to_adhesion(int, const std::function<Vec2(Vec2)>&) const override { return none; }
+    VectorXd variance_of_free_ends(const VectorXd&, double) const override { return none; }
+  };
   class Taut final : public network::AtRest {
    public:
     Taut(MatrixXd forces, VectorXd tensions_nN) : forces_(std::move(forces)), tensions_nN_(std::move(tensions_nN)) {
@@ -41,7 +52,9 @@ class Ropes final : public network::Contractile {
     VectorXd torques_nN_um() const override { return VectorXd::Zero(forces_.rows() / 2); }
     network::CutReaction cut_reaction() const override { return {}; }
     MatrixXd force_derivatives(int) const override { return forces_; }
-    std::unique_ptr<network::GeometryAnswer> answer_to_geometry(const MatrixXd&) const override { return {}; }
+    std::unique_ptr<network::GeometryAnswer> answer_to_geometry(const MatrixXd& weights) const override {
+      return std::make_unique<Rigid>(weights.cols());
+    }
 
    private:
     MatrixXd forces_;
@@ -98,7 +111,8 @@ struct CellInSpace {
     constexpr double kNoise_um = 0.05;
     test::Normal normal(seed);
     std::vector<Vec3> beads;
-    LinearData data{.has_errors = true, .dimension = 3};
+    LinearData data{.held_um = std::vector<double>(ids.size(), 0.0), .has_errors = true, .dimension = 3};
+    data.held_um.back() = 5;
     for (int b = 0; b < 1500; ++b) {
       const Vec3 at{30 + 8 * normal(), 30 + 8 * normal(), 0.2 + std::abs(normal())};
       beads.push_back(at), data.position_um.push_back({at.x, at.y}), data.height_um.push_back(-at.z);
@@ -112,6 +126,13 @@ struct CellInSpace {
     data.n_used = data.displacement_um.size();
     data.weight_per_um = VectorXd::Constant(data.n_used, 1 / kNoise_um);
     return reweighted(std::move(data), VectorXd::Ones(1500));
+  }
+
+  /// By the true ropes, of beads that move by so much more.
+  EnsembleFit fitted(LinearData data, const VectorXd& more_um) const {
+    data.displacement_um += more_um;
+    return fit_ensemble(std::vector{Ropes(ids, forces)}, reweighted(std::move(data), VectorXd::Ones(1500)), ids,
+                        {.loss = Loss::squares}, 2);
   }
 
   /// Two networks that are not the truth.
@@ -160,10 +181,14 @@ TEST(Contractile, is_fitted_in_space_as_in_the_plane) {
 TEST(Contractile, has_forces_in_space_within_their_errors) {
   const CellInSpace scene;
   constexpr int kDraws = 10;
-  double of_forces = 0, of_total = 0;
+  double of_forces = 0, of_total = 0, by_budget = 0;
   for (unsigned draw = 0; draw < kDraws; ++draw) {
-    const EnsembleFit fit =
-        fit_ensemble(scene.others(100 + draw), scene.measured(300 + draw), scene.ids, {.loss = Loss::squares}, 2);
+    const std::vector<Ropes> others = scene.others(100 + draw);
+    const EnsembleFit fit = fit_ensemble(others, scene.measured(300 + draw), scene.ids, {.loss = Loss::squares}, 2);
+    const ErrorBudget budget = error_budget({fit, fit.data, others, scene.cell, test::kGel}, 2);
+    by_budget += std::pow((budget.total_force_nN - total_nN(scene.true_nN, 3)) / total(budget.total_force_parts_nN), 2);
+    const ErrorParts& parts = budget.tensions[1].parts_nN;
+    EXPECT_NEAR(std::hypot(parts.beads, *parts.mesh, parts.model), fit.tensions.nN[1].standard_error, 1e-6);
     for (std::size_t a = 0; a < scene.ids.size(); ++a) {
       const Estimate& found = fit.forces.magnitudes[a];
       const double error_nN = found.value - scene.true_nN.segment<3>(3 * static_cast<Index>(a)).norm();
@@ -174,6 +199,41 @@ TEST(Contractile, has_forces_in_space_within_their_errors) {
   }
   EXPECT_LT(of_forces, 1.5);
   EXPECT_LT(of_total, 2.3);  // of ten draws: one in a hundred is above
+  EXPECT_LT(by_budget / kDraws, 2.3);
+}
+
+/// A rope from the first adhesion to the top of the nucleus, or a force between them.
+TEST(Contractile, has_what_the_model_lacks_found_in_space) {
+  const CellInSpace scene;
+  const LinearData data = scene.measured(6);
+  VectorXd lacking = VectorXd::Zero(scene.true_nN.size());
+  const Vec2 d = Vec2{30, 30} - scene.cell.adhesions[0].position_um;
+  lacking.head<3>() = 4 * Eigen::Vector3d(d.x, d.y, -5).normalized();
+  lacking.tail<3>() = -lacking.head<3>();
+  const std::vector<MissingFibre> ropes =
+      missing_fibres(scene.fitted(data, data.response->displace(lacking)), scene.cell.adhesions);
+  ASSERT_EQ(ropes.size(), 1u);
+  EXPECT_EQ(std::pair(ropes[0].start_adhesion_id, ropes[0].end_adhesion_id), std::pair(scene.ids.front(), 99));
+  EXPECT_NEAR(ropes[0].tension_nN, 4, 4 * sigma_nN(ropes[0]));
+  constexpr Vec2 kPlace{22.3, 30.4};
+  const auto gel = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 2);
+  const MatrixXd by_force = response_to({{kPlace, 0.6, 0.4, 1}}, places_of_beads(data), 3, *gel)->matrix();
+  const std::vector<MissingAdhesion> forces =
+      missing_adhesions(scene.fitted(data, by_force * Eigen::Vector3d(1, -1, 3)), scene.cell, test::kGel, 2);
+  ASSERT_EQ(forces.size(), 1u);
+  EXPECT_LT(norm(forces[0].position_um - kPlace), 1.5) << "places are a micrometre apart";
+}
+
+/// By a stage that goes into the gel, and tilts.
+TEST(Contractile, is_fitted_beside_a_motion_in_space) {
+  const CellInSpace scene;
+  const LinearData data = with_more_motions(scene.measured(7), affine_motions(places_of_beads(scene.measured(7))));
+  const Eigen::Vector3d planted(0.4, 0.02, -0.01);
+  const MatrixXd motions = data.motions.shapes.rightCols<3>();
+  const EnsembleFit still = scene.fitted(data, 0 * motions.col(0)), fit = scene.fitted(data, motions * planted);
+  EXPECT_LE((values_of(fit) - values_of(still)).norm(), 1e-6 * values_of(still).norm());
+  const FoundMotion found = common_motion_among(motions_beside(fit.data, fit), fit.data);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(found.out_of_plane[i], planted[i], 4 * found.sigma[6 + i]) << i;
 }
 
 TEST(Contractile, is_moved_by_no_false_bead_in_space) {

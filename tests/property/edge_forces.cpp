@@ -37,11 +37,7 @@ struct DimlyHeld {
   }
   EnsembleFit fitted(unsigned seed) {
     test::measure(scene, 0.02, seed);
-    const LinearData data =
-        reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
-    std::vector<cables::CableNetwork> networks;
-    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    return fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
+    return test::fit_to(test::with_motions(scene, scene.beads), scene);
   }
 };
 

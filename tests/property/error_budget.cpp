@@ -23,9 +23,7 @@ Cell cell_of(const TensionScene& scene) {
                               .area_um2 = std::numbers::pi * e.semi_major_um * e.semi_minor_um,
                               .major_axis_um = 2 * e.semi_major_um,
                               .minor_axis_um = 2 * e.semi_minor_um,
-                              .angle_rad = e.angle_rad,
-                              .eccentricity = 0,
-                              .mean_intensity = 1});
+                              .angle_rad = e.angle_rad});
   }
   return cell;
 }
@@ -37,62 +35,35 @@ struct Fitted {
   ErrorBudget budget(SegmentationErrors errors, double substrate_error = 0, bool lacks_base = false,
                      const Gel& gel = test::kGel) const {
     const Cell cell = cell_of(scene);
-    return error_budget({.fit = fit,
-                         .data = fit.data,
-                         .networks = networks,
-                         .cell = cell,
-                         .beads = scene.beads,
-                         .gel = gel,
-                         .substrate_error = substrate_error,
-                         .lacks_base = lacks_base,
-                         .segmentation = errors},
-                        2);
+    return error_budget({fit, fit.data, networks, cell, gel, substrate_error, lacks_base, errors}, 2);
   }
 };
 
 Fitted fitted(TensionScene scene) {
   Fitted f{std::move(scene), {}, {}};
   f.networks.emplace_back(f.scene.cables.network());
-  f.fit = fit_ensemble(f.networks, f.scene.data, f.scene.adhesion_ids, {.n_meshes = 1}, 2);
+  f.fit = test::fit_own_network(f.scene);
   return f;
 }
 
 /// The fit's answers, in truth, to a change of the displacements.
 Eigen::VectorXd answers(const Fitted& f, const Eigen::VectorXd& displacement_um) {
-  TensionScene other{.cables = cables::CableNetwork(f.scene.cables.network()),
-                     .tensions_nN = f.scene.tensions_nN,
-                     .adhesion_ids = f.scene.adhesion_ids,
-                     .ellipses = f.scene.ellipses,
-                     .points_um = f.scene.points_um,
-                     .compliance_um_per_nN = f.scene.compliance_um_per_nN,
-                     .displacement_um = displacement_um,
-                     .largest_um = 0};
-  test::measure(other, 0, 1);
-  for (Bead& bead : other.beads) bead.sigma_um = f.scene.beads.front().sigma_um;
-  other.data = reduce(other.beads, other.compliance_um_per_nN);
-  const EnsembleFit fit = test::fit_own_network(other, {.loss = Loss::squares});  // the propagation is that of squares
+  DisplacementField beads = f.scene.beads;
+  for (std::size_t b = 0; b < beads.size(); ++b)
+    beads[b].displacement_um = {displacement_um[2 * b], displacement_um[2 * b + 1]};
+  const EnsembleFit fit =  // the propagation is that of squares
+      test::fit_to(reduce(beads, f.scene.compliance_um_per_nN), f.scene, {.loss = Loss::squares});
   return test::values_of(fit) - f.scene.tensions_nN;
 }
 
 TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
-  const Cell cell = [] {
-    Cell round = test::round_cell(14, 16);
-    for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(round, a, b);
-    return round;
-  }();
-  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.05, 7);
-  std::vector<cables::CableNetwork> networks;
+  Cell cell = test::round_cell(14, 16);
+  for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
+  Fitted f{test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.05, 7), {}, {}};
   for (std::uint64_t seed = 11; seed < 15; ++seed)
-    networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
-  const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2);
-  const ErrorBudget budget = error_budget({.fit = fit,
-                                           .data = fit.data,
-                                           .networks = networks,
-                                           .cell = cell,
-                                           .beads = scene.beads,
-                                           .gel = test::kGel,
-                                           .segmentation = kExact},
-                                          2);
+    f.networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
+  const EnsembleFit& fit = f.fit = fit_ensemble(f.networks, f.scene.data, f.scene.adhesion_ids, {}, 2);
+  const ErrorBudget budget = f.budget(kExact);
   for (std::size_t i = 0; i < fit.tensions.nN.size(); ++i) {
     const ErrorParts& parts = budget.tensions[i].parts_nN;
     EXPECT_NEAR(parts.beads, fit.tensions.nN[i].noise, 1e-9 * parts.beads) << i;
@@ -192,19 +163,11 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
   for (int steps = 1; steps < 6; ++steps) {
     Fitted early{scene(), {}, {}};
     early.networks.emplace_back(early.scene.cables.network());
-    early.fit = fit_ensemble(early.networks, early.scene.data, early.scene.adhesion_ids,
-                             {.loss = Loss::squares, .n_meshes = 1, .max_steps = steps}, 2);
+    early.fit = test::fit_own_network(early.scene, {.loss = Loss::squares, .max_steps = steps});
     const Eigen::VectorXd left = test::values_of(early.fit) - end;
     // further off the misfit bends, and nearer the whole fit's own last step counts
     if (left.norm() > 0.1 * end.norm() || left.norm() < 1e-4 * end.norm()) continue;
-    const ErrorBudget budget = error_budget({.fit = early.fit,
-                                             .data = early.fit.data,
-                                             .networks = early.networks,
-                                             .cell = cell,
-                                             .beads = early.scene.beads,
-                                             .gel = test::kGel,
-                                             .segmentation = kExact},
-                                            2);
+    const ErrorBudget budget = early.budget(kExact);
     double stated = 0;
     for (const auto& tension : budget.tensions) stated += std::pow(tension.parts_nN.solver, 2);
     // to first order: the forces' answer to tensions bends by some per cent over so short a step

@@ -37,12 +37,7 @@ struct Hidden {
   }
   std::vector<MissingAdhesion> found(unsigned seed, double noise = 0.05) {
     test::measure(scene, noise, seed);
-    LinearData data =
-        reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
-    std::vector<cables::CableNetwork> networks;
-    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    const EnsembleFit fit = fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
-    return missing_adhesions(fit, cell, test::kGel, 1);
+    return missing_adhesions(test::fit_to(test::with_motions(scene, scene.beads), scene), cell, test::kGel, 1);
   }
 };
 

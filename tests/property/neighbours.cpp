@@ -114,7 +114,7 @@ TEST(Neighbours, beads_beside_them_are_no_witness_of_rest) {
   for (Bead& bead : s.beads)
     if (is_nearer_to_neighbour(cell, bead.position_um)) bead.displacement_um += Vec2{5, 5};
   const LinearData data = s.data();
-  const NoiseLevel noise = noise_level(s.beads, data, free_forces_nN(data.reduced), cell.outline_um, 0);
+  const NoiseLevel noise = noise_level(data, free_forces_nN(data.reduced), cell.outline_um, 0);
   // of some 2 000 components a median is known to 2 %, and the forces take 80 of them
   EXPECT_NEAR(noise.sigma_um, s.experiment.noise_um, 0.1 * s.experiment.noise_um);
 }

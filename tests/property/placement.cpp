@@ -215,20 +215,14 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
   const LinearData known = still.data_of(still.scene.beads);
-  const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1);
+  const EnsembleFit with_known = test::fit_to(known, still.scene);
   const Eigen::VectorXd& forces = with_known.forces.nN;
   const LinearData unknown =
       with_more_motions(known, placement_motions(test::kGel, still.scene.ellipses, forces, still.scene.points_um,
                                                  known.response->displace(forces), {30, 30}, 1));
   const EnsembleFit fit = fit_ensemble(networks, unknown, still.scene.adhesion_ids, {}, 1);
-  const ErrorBudget budget = error_budget({.fit = fit,
-                                           .data = fit.data,
-                                           .networks = networks,
-                                           .cell = still.cell,
-                                           .beads = still.scene.beads,
-                                           .gel = test::kGel,
-                                           .n_of_place = 3},
-                                          1);
+  const ErrorBudget budget = error_budget(
+      {.fit = fit, .data = fit.data, .networks = networks, .cell = still.cell, .gel = test::kGel, .n_of_place = 3}, 1);
   const auto noise = [](const EnsembleFit& of) -> Eigen::VectorXd {
     return of.meshes.front().noise_covariance_nN2.diagonal() / of.misfit.variance;
   };

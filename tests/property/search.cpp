@@ -1,6 +1,5 @@
 #include "mbtfm/tensions/search.h"
 
-#include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/numerics/dense.h"
 #include "tests/support/tension_scene.h"
@@ -13,13 +12,7 @@ using test::TensionScene;
 struct FittedToFew {
   TensionScene scene = test::tension_scene("case_21", 200, 0.05, 1);
   EnsembleFit fit;
-  FittedToFew() {
-    const LinearData data =
-        reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
-    std::vector<cables::CableNetwork> networks;
-    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    fit = fit_ensemble(networks, data, scene.adhesion_ids, {.loss = Loss::squares}, 1);
-  }
+  FittedToFew() { fit = test::fit_to(test::with_motions(scene, scene.beads), scene, {.loss = Loss::squares}); }
 };
 
 TEST(Search, scores_are_those_of_generalised_least_squares_of_all_beads) {

@@ -31,11 +31,7 @@ struct PullingCell {
     };
   }
   /// Fitted on the network that made the forces.
-  EnsembleFit fit(LinearData data) const {
-    std::vector<cables::CableNetwork> networks;
-    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    return fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
-  }
+  EnsembleFit fit(const LinearData& data) const { return test::fit_to(data, scene); }
 };
 
 /// @param share  of tensions that move the gel by more than an adhesion's radius

@@ -149,8 +149,7 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
   tensions::FitParameters parameters;
   parameters.n_meshes = n_meshes;
   result.fit = tensions::fit_ensemble(networks, std::move(data), ids, parameters, 2);
-  result.motion =
-      tensions::common_motion_among(tensions::motions_beside(result.fit.data, result.fit), result.fit.data.position_um);
+  result.motion = tensions::common_motion_among(tensions::motions_beside(result.fit.data, result.fit), result.fit.data);
   return result;
 }
 

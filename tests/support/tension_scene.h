@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 
+#include "mbtfm/inverse/rows.h"
 #include "mbtfm/tensions/ensemble.h"
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
@@ -164,12 +165,22 @@ inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_n
   return scene;
 }
 
+/// Beads of the scene, which may move all alike, too.
+inline tensions::LinearData with_motions(const TensionScene& scene, const DisplacementField& beads) {
+  const Eigen::MatrixXd motions = inverse::affine_motions(beads);
+  return tensions::reduce(beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, motions);
+}
+
 /// The fit on the scene's own network.
-inline tensions::EnsembleFit fit_own_network(const TensionScene& scene, tensions::FitParameters parameters = {}) {
-  parameters.n_meshes = 1;
+inline tensions::EnsembleFit fit_to(const tensions::LinearData& data, const TensionScene& scene,
+                                    const tensions::FitParameters& parameters = {}) {
   std::vector<cables::CableNetwork> networks;
-  networks.emplace_back(scene.cables.network());
-  return tensions::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2);
+  networks.emplace_back(scene.cables.network(), scene.cables.parameters());
+  return tensions::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 2);
+}
+inline tensions::EnsembleFit fit_own_network(const TensionScene& scene,
+                                             const tensions::FitParameters& parameters = {}) {
+  return fit_to(scene.data, scene, parameters);
 }
 
 using tensions::values_of;
