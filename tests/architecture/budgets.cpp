@@ -11,7 +11,7 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105320;
+constexpr int kLinesOfProduct = 105400;
 constexpr int kLinesOfTests = 45622;
 constexpr int kLongSources = 11;                                                  // .cpp of the product above 400 lines
 constexpr int kLongestSource = 570;                                               // lines
