@@ -17,10 +17,7 @@ int from_environment(const char* name, int otherwise) {
   return text ? std::atoi(text) : otherwise;
 }
 
-SceneOutcome run(const RandomScene& scene) {
-  const test::TemporaryFolder folder;
-  return test::run_scene(scene, folder / "cell");
-}
+SceneOutcome run(const RandomScene& scene) { return test::run_scene(scene, test::TemporaryFolder() / "cell"); }
 
 void tell(std::uint64_t seed, const SceneOutcome& outcome) {
   static constexpr const char* kKinds[] = {"answered", "refused", "cannot be drawn"};
