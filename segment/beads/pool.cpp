@@ -54,14 +54,14 @@ struct ErrorCheck {
 
 /// Compare the registrations' standard errors with what the neighbours see of them: the median of misfit² / variance
 /// must be that of a two-dimensional normal variable, ln 2 of a component's mean square. A registration may be wrong
-/// about its own variance by half of it, to either side; what is beyond that is scatter of single beads. Only the
-/// quarter of the beads counts around which the field changes least: elsewhere it is the field that predictions miss.
+/// about its own variance by half of it, to either side; what is beyond that is scatter of single beads. Only the half
+/// of the beads counts around which the field changes least: elsewhere it is the field that predictions miss.
 ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vector<Track>& tracks) {
   std::vector<double> gradients;
   for (const Prediction& p : predicted) {
     if (p.misfit >= 0) gradients.push_back(p.gradient);
   }
-  const double calm = numerics::quantile(std::move(gradients), 0.25);
+  const double calm = numerics::quantile(std::move(gradients), 0.5);
   ErrorCheck result;
   const auto median_ratio = [&](double scatter) {
     std::vector<double> ratios;
