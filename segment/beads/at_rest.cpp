@@ -12,8 +12,10 @@
 namespace mbtfm::beads {
 namespace {
 
-/// Half a dozen beads know their mean to under half of a bead's noise, and outliers among them show.
-constexpr double kBeadsOfSquare = 6;
+/// Half a dozen beads know their mean to under half of a bead's noise, and outliers among them show. Three are enough
+/// where squares would be so large that they hide the tail of a cell's field.
+constexpr double kBeadsOfSquare = 6, kFewestOfSquare = 3;
+constexpr int kFine = 16;         // squares a side that show a tail
 constexpr int kMostSquares = 24;  // a side: an ordinary cell's tail is smooth over a 24th of the picture
 /// What moves by less than this share of the largest displacement may be the cell's tail; where that leaves less than a
 /// quarter of the picture at rest, by less than twice as much: the tail of a cell that the border cuts is long.
@@ -49,7 +51,8 @@ FieldCell cell_of(const std::vector<int>& beads, const std::vector<Vec2>& positi
 RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, Vec2 corner, double width,
                         double height) {
   RestingField field{.corner = corner, .width = width, .height = height, .cells = {}, .motion = {}};
-  const double wanted = std::sqrt(static_cast<double>(positions.size()) / kBeadsOfSquare);
+  const auto n = static_cast<double>(positions.size());
+  const double wanted = std::max(std::sqrt(n / kBeadsOfSquare), std::min(std::sqrt(n / kFewestOfSquare), 1.0 * kFine));
   field.side = std::sqrt(width * height) / std::clamp(std::floor(wanted), 2.0, 1.0 * kMostSquares);
   field.nx = std::max(1, static_cast<int>(std::lround(width / field.side)));
   field.ny = std::max(1, static_cast<int>(std::lround(height / field.side)));
@@ -217,14 +220,15 @@ Squares grown(const Squares& is, int reach) {
   return result;
 }
 
-/// Mean of a square and the eight around it, beside a motion; nothing where there are no beads.
+/// Mean of a square and the eight around it, beside a motion; nothing where there are no beads. Of a coarse division
+/// nine squares would hide what an adhesion pulls: there a square is alone.
 struct Around {
   Vec2 u;
   int n_beads = 0;
 };
 Around around(const RestingField& field, const AffineMotion& motion, int i, int j) {
   Around result;
-  for_each_within(field, i, j, 1, [&](int, int, std::size_t k) {
+  for_each_within(field, i, j, std::min(field.nx, field.ny) < kFine ? 0 : 1, [&](int, int, std::size_t k) {
     const FieldCell& cell = field.cells[k];
     if (cell.n_beads == 0) return;
     result.u += cell.n_beads * (cell.u - motion.at(cell.place));

@@ -75,6 +75,7 @@ TEST(Track, standard_errors_hold_for_few_and_many_bright_and_dim_beads) {
     const test::TrackingErrors e =
         test::errors_of(track_beads(pair.relaxed, pair.stressed, 1.0, test::in_relaxed_frame(), 2), peaks);
     EXPECT_GE(e.n_good, 0.95 * e.n_beads);
+    EXPECT_LE(e.drift.root(), 0.01);
     EXPECT_GE(e.variance.mean(), 0.7);
     EXPECT_LE(e.variance.mean(), 1.4);
   }
