@@ -13,9 +13,8 @@ namespace mbtfm::beads {
 namespace {
 
 /// Half a dozen beads know their mean to under half of a bead's noise, and outliers among them show. Three are enough
-/// where squares would be so large that they hide the tail of a cell's field.
-constexpr double kBeadsOfSquare = 6, kFewestOfSquare = 3;
-constexpr int kFine = 16;         // squares a side that show a tail
+/// where squares would be so large that they hide the tail of a cell's field; fewer than ten a side show none.
+constexpr double kBeadsOfSquare = 6, kFewestOfSquare = 3, kFewSquares = 10, kFineSquares = 16;  // squares: a side
 constexpr int kMostSquares = 24;  // a side: an ordinary cell's tail is smooth over a 24th of the picture
 /// What moves by less than this share of the largest displacement may be the cell's tail; where that leaves less than a
 /// quarter of the picture at rest, by less than twice as much: the tail of a cell that the border cuts is long.
@@ -52,7 +51,8 @@ RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Ve
                         double height) {
   RestingField field{.corner = corner, .width = width, .height = height, .cells = {}, .motion = {}};
   const auto n = static_cast<double>(positions.size());
-  const double wanted = std::max(std::sqrt(n / kBeadsOfSquare), std::min(std::sqrt(n / kFewestOfSquare), 1.0 * kFine));
+  const double most = std::min(std::sqrt(n / kFewestOfSquare), kFineSquares),
+               wanted = std::max(std::sqrt(n / kBeadsOfSquare), most < kFewSquares ? 0.0 : most);
   field.side = std::sqrt(width * height) / std::clamp(std::floor(wanted), 2.0, 1.0 * kMostSquares);
   field.nx = std::max(1, static_cast<int>(std::lround(width / field.side)));
   field.ny = std::max(1, static_cast<int>(std::lround(height / field.side)));
@@ -220,15 +220,16 @@ Squares grown(const Squares& is, int reach) {
   return result;
 }
 
-/// Mean of a square and the eight around it, beside a motion; nothing where there are no beads. Of a coarse division
-/// nine squares would hide what an adhesion pulls: there a square is alone.
+/// Mean of a square and the eight around it, beside a motion; nothing where there are no beads. Where squares are as
+/// large as can show a tail, nine would hide what an adhesion pulls: there a square is alone.
 struct Around {
   Vec2 u;
   int n_beads = 0;
 };
 Around around(const RestingField& field, const AffineMotion& motion, int i, int j) {
   Around result;
-  for_each_within(field, i, j, std::min(field.nx, field.ny) < kFine ? 0 : 1, [&](int, int, std::size_t k) {
+  const int n = std::min(field.nx, field.ny);
+  for_each_within(field, i, j, n >= kFewSquares && n < kFineSquares ? 0 : 1, [&](int, int, std::size_t k) {
     const FieldCell& cell = field.cells[k];
     if (cell.n_beads == 0) return;
     result.u += cell.n_beads * (cell.u - motion.at(cell.place));
