@@ -44,7 +44,7 @@ struct RestingField {
 
 /// Find the largest part of the picture that moves as one affine body within its noise and the tail of what is pulled.
 ///
-/// The picture is divided into squares of half a dozen beads. The body's motion is a mode over them: least squares with
+/// The picture is divided into squares of three to six beads. The body's motion is a mode over them: least squares with
 /// the weights of Geman and McClure, 1/(1 + (r/s)²)², whose width s is narrowed step by step (Black & Rangarajan, Int J
 /// Comput Vis 19:57, 1996), begun from the whole, its frame, its sides, its corners; the motion that most squares
 /// follow counts. What follows it is at rest where it is connected with the border. So a cell may lie anywhere, or be
