@@ -14,7 +14,7 @@ namespace {
 
 /// Half a dozen beads know their mean to under half of a bead's noise, and outliers among them show. Three are enough
 /// where squares would be so large that they hide the tail of a cell's field; fewer than ten a side show none.
-constexpr double kBeadsOfSquare = 6, kFewestOfSquare = 3, kFewSquares = 10, kFineSquares = 16;  // squares: a side
+constexpr double kBeadsOfSquare = 6, kFewestOfSquare = 3, kFewSquares = 10, kFineSquares = 16;  // the last two a side
 constexpr int kMostSquares = 24;  // a side: an ordinary cell's tail is smooth over a 24th of the picture
 /// What moves by less than this share of the largest displacement may be the cell's tail; where that leaves less than a
 /// quarter of the picture at rest, by less than twice as much: the tail of a cell that the border cuts is long.
