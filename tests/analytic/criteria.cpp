@@ -177,7 +177,7 @@ LambdaScan scan_by_direction(const MatrixXd& G, const VectorXd& u, double varian
       .scan(variance, signal_in);
 }
 
-TEST(Criteria, risk_by_direction_is_that_of_all_where_each_direction_is_told) {
+TEST(Criteria, risk_by_direction_is_that_of_all_where_each_direction_is_resolved) {
   const MatrixXd G = falling(120, 40, 0.9, 1);
   const VectorXd u = G * VectorXd::Constant(40, 1) + noise_of(1e-2, 120, 4);
   EXPECT_NEAR(
@@ -240,7 +240,7 @@ TEST(Criteria, do_not_depend_on_the_unit_of_the_displacements) {
   EXPECT_EQ(one.by_l_curve.has_value(), other.by_l_curve.has_value());
 }
 
-TEST(Criteria, the_variance_that_residuals_tell_is_that_of_the_data) {
+TEST(Criteria, the_variance_that_residuals_show_is_that_of_the_data) {
   const MatrixXd G = ring_of_bells(2);
   constexpr int kDraws = 400;
   for (const double lambda : {0.3, 1.0, 3.0}) {

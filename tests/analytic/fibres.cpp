@@ -116,7 +116,7 @@ TEST(Fibres, without_adhesions_are_arcs) {
   }
 }
 
-TEST(Fibres, tell_why_they_have_their_type) {
+TEST(Fibres, say_why_they_have_their_type) {
   const Polyline line{{5, 12}, {20, 12}};
   const auto fibres = fibres_of(drawn({line}), {ellipse(3, {4.9, 12}, 1.6, 0.6, 0), ellipse(8, {12, 12}, 1, 0.6, 0)});
   ASSERT_EQ(fibres.size(), 1u);

@@ -90,7 +90,7 @@ TEST(Outline, contains_every_adhesion_it_owns) {
   EXPECT_EQ(inside(cells[0], adhesions).size(), adhesions.size());
 }
 
-TEST(Outline, tells_how_far_each_adhesion_lies_beyond_what_the_image_shows) {
+TEST(Outline, says_how_far_each_adhesion_lies_beyond_what_the_image_shows) {
   images::Image image = even_image(400, 400, 100);
   const Adhesion disc = ellipse(1, {20, 20}, 20, 20, 0);
   draw_ellipse(image, disc, 200, 0.15, kPixel_um);

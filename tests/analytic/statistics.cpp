@@ -243,7 +243,7 @@ TEST(MixedModel, what_the_groups_means_take_up_is_no_variance_between_cells) {
   EXPECT_TRUE(fit.residual_variance[0]);
 }
 
-TEST(MixedModel, kinds_without_two_values_in_a_group_have_no_scatter_that_could_be_told) {
+TEST(MixedModel, kinds_without_two_values_in_a_group_have_no_scatter) {
   const MixedFit fit = fit_mixed_model({{.value = 1},
                                         {.value = 2, .cell = 1},
                                         {.value = 1.5, .cell = 2},

@@ -40,7 +40,7 @@ TEST(Track, a_shift_of_the_whole_picture_is_drift) {
 
 /// The pair of the reference table (512² px, 5 242 beads of 1.3 px, steepest displacement 8.3 px), where the best of
 /// the common methods has 0.13 px over all beads, 0.044 where little moves, 0.63 where much does and 0.97 of the peaks.
-TEST(Track, steep_peaks_are_followed_and_the_standard_errors_tell_how_well) {
+TEST(Track, steep_peaks_are_followed_and_the_standard_errors_show_how_well) {
   const auto peaks = test::ring_of_adhesions(512, 8.3);
   test::TrackingErrors all;
   for (const std::uint64_t seed : {1u, 2u, 3u}) {

@@ -19,7 +19,7 @@ using test::half_space;
 
 /// A drift beside, three beads in a hundred that went elsewhere, and three of which nothing is known. The field is that
 /// of a half-space with Poisson's ratio 0.5 as nearly as a layer of 60 um is.
-TEST(FieldOfAdhesions, tells_where_beads_went_that_are_astray_or_flagged) {
+TEST(FieldOfAdhesions, gives_the_motion_of_beads_that_are_false_or_flagged) {
   EllipseScene scene = ellipse_scene(64, 0);
   const Vec2 drift{0.8, -0.5};
   const DisplacementField truth = scene.field;
@@ -358,7 +358,7 @@ TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) 
   }
 }
 
-TEST(AdhesionForces, of_few_beads_tell_the_noise_by_what_forces_leave_of_it) {
+TEST(AdhesionForces, of_few_beads_show_the_noise_by_what_forces_leave_of_it) {
   // 20 components of noise alone, of which two forces follow 4
   EllipseScene scene = ellipse_scene(16, 0, 3);
   scene.adhesions.resize(2);
@@ -499,7 +499,7 @@ TEST(NeighbourNoise, is_the_noise_of_the_field_whatever_the_cell_does_to_it) {
   }
 }
 
-TEST(NeighbourNoise, is_not_told_by_few_beads_or_beads_on_a_line) {
+TEST(NeighbourNoise, is_not_known_from_few_beads_or_beads_on_a_line) {
   EllipseScene scene = ellipse_scene(64, 0.05, 11);
   scene.field.resize(39);
   EXPECT_FALSE(noise_from_neighbours_um(scene.field));

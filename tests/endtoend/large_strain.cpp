@@ -101,7 +101,7 @@ TEST_F(LargeStrains, what_has_no_model_of_them_is_refused_or_said) {
   EXPECT_TRUE(has_words(output_of(run(kGraded)), "one modulus alone"));
 }
 
-TEST_F(LargeStrains, a_gel_too_soft_for_its_forces_is_fitted_linearly_and_told) {
+TEST_F(LargeStrains, a_gel_too_soft_for_its_forces_is_fitted_linearly_and_named) {
   // the same displacement on a gel of another modulus: tractions over the modulus stay, so the forces are raised
   DisplacementField beads = files::read_displacement(cell() / "2_track/displacement.csv");
   for (Bead& b : beads) {

@@ -142,7 +142,7 @@ TEST_F(Segment, an_outline_far_beyond_all_adhesions_is_doubted) {
   EXPECT_TRUE(fires("outline-doubtful", "beyond all adhesions", said)) << said;
 }
 
-TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_told) {
+TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_named) {
   test::draw_ellipse(scene_.actin_image, test::ellipse(1, {23, 23}, 7.4, 7.4, 0), 200, 0.13, scene_.kPixel_um);
   images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
   const std::string said = segment("out", kBoth + " --outline_smallest_um2 20").output;
@@ -150,7 +150,7 @@ TEST_F(Segment, a_second_cell_that_touches_is_cut_off_and_told) {
   EXPECT_FALSE(contains(files::read_cell(folder_ / "out").outline_um, {23, 23}));
 }
 
-TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
+TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_named) {
   test::draw_ellipse(scene_.adhesion_image, test::ellipse(6, {23, 23}, 1.6, 0.6, 0.6), 500, 0.13, scene_.kPixel_um);
   images::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
   const std::string said = segment("out", kBoth).output;
@@ -158,7 +158,7 @@ TEST_F(Segment, an_adhesion_beside_the_cell_is_left_out_and_told) {
   EXPECT_TRUE(fires("images-mismatch", "of the adhesions' area", said)) << said;
 }
 
-TEST_F(Segment, a_speck_beside_the_cell_is_left_out_and_told) {
+TEST_F(Segment, a_speck_beside_the_cell_is_left_out_and_named) {
   test::draw_ellipse(scene_.actin_image, test::ellipse(1, {24.2, 24.2}, 2, 2, 0), 400, 0.13, scene_.kPixel_um);
   images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
   const std::string said = segment("out", kBoth).output;
@@ -166,7 +166,7 @@ TEST_F(Segment, a_speck_beside_the_cell_is_left_out_and_told) {
   EXPECT_TRUE(has_words(said, "1 bright thing too small for a cell"));
 }
 
-TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_are_told) {
+TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_are_named) {
   rois::Roi fibre, outline;
   fibre.name = "ventral 1";
   fibre.shape = rois::RoiShape::polyline;
@@ -184,7 +184,7 @@ TEST_F(Segment, an_end_that_no_adhesion_holds_and_an_input_that_does_not_count_a
 }
 
 /// An adhesive ring is a pattern; the adhesions themselves and the whole cell are none.
-TEST_F(Segment, a_mask_that_is_no_pattern_is_told) {
+TEST_F(Segment, a_mask_that_is_no_pattern_is_named) {
   const auto with = [&](const images::Image& mask) {
     images::write_tiff(folder_ / "mask.tif", mask);
     return segment("out", "--actin-image actin.tif --adhesions pattern --adhesion-mask mask.tif").output;
@@ -201,7 +201,7 @@ TEST_F(Segment, a_mask_that_is_no_pattern_is_told) {
 }
 
 /// A small cell with ten fibres, as the simulator draws it.
-TEST_F(Segment, images_that_are_shifted_or_exchanged_and_actin_that_is_no_fibre_are_told) {
+TEST_F(Segment, images_that_are_shifted_or_exchanged_and_actin_that_is_no_fibre_are_named) {
   constexpr std::uint64_t kSeed = 1;
   constexpr int kSide_px = 420;
   files::write_text(folder_ / "scenario.toml",

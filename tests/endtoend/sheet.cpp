@@ -318,7 +318,7 @@ TEST_F(FittedSheet, the_stiffness_of_the_adhesions_comes_back_and_is_called_for)
 
 /// The beads of the computed gel lie where they are seen while the sheet pulls, as its outline does. A tracker gives
 /// their places at rest: taken for places under load, they blur the pull at the edge.
-TEST_F(FittedSheet, beads_that_were_seen_under_load_tell_the_contraction_if_they_are_taken_there) {
+TEST_F(FittedSheet, beads_that_were_seen_under_load_show_the_contraction_if_they_are_taken_there) {
   move_beads("contraction_nN_per_um = 3\n");
   DisplacementField beads = files::read_displacement(folder_ / "displacement.csv");
   for (Bead& bead : beads) bead.position_um = bead.position_um - bead.displacement_um;
@@ -397,7 +397,7 @@ TEST_F(Sheet, an_imagej_selection_is_an_outline_and_a_stress_times_thickness_a_c
   EXPECT_NEAR(figure("mean_tension_nN_per_um"), mean, 2e-3 * mean);
 }
 
-TEST_F(Sheet, tractions_of_a_larger_area_tell_both_means_their_errors_and_what_is_out_of_balance) {
+TEST_F(Sheet, tractions_of_a_larger_area_show_both_means_their_errors_and_what_is_out_of_balance) {
   ASSERT_EQ(run(std::string(kSheet) + "adhesion_stiffness_nN_per_um3 = 0.003\n").code, 0);
   const double mean = figure("mean_tension_nN_per_um");
   std::filesystem::rename(folder_ / "out" / "traction.csv", folder_ / "traction.csv");

@@ -79,7 +79,7 @@ TEST_F(Surface, of_an_image_of_heights_has_its_holes_filled_or_refused_by_place)
   EXPECT_TRUE(has_words(output_of(run("--z_points into-gel --height_map hole.csv"), 3), "near x, y = 0, 0"));
 }
 
-TEST_F(Surface, from_beads_knows_its_error_and_tells_beads_above_it) {
+TEST_F(Surface, from_beads_knows_its_error_and_shows_beads_above_it) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> across(-20, 20), down(-10, 40);
   std::string text = "x_um,y_um,z_um\n";
@@ -148,7 +148,7 @@ TEST_F(Surface, of_masks_lies_between_their_slices_whichever_comes_first) {
       output_of(run("--z_points into-gel --z_unit_um 0.01 --pixel_size_um 1 --height_map down.tif"), 3), "40 pages"));
 }
 
-TEST_F(Surface, asks_for_what_no_file_tells) {
+TEST_F(Surface, asks_for_what_no_file_says) {
   write("points.csv", table(20, [](Vec2 p) { return shortest(wave(p)); }));
   EXPECT_TRUE(has_words(output_of(run("--points points.csv"), 2), "z_points"));
   EXPECT_EQ(run("").code, 2);
@@ -235,7 +235,7 @@ TEST_F(Gel, carries_a_lattice_of_tractions_on_its_surface) {
   output_of(run_in(folder_, gel + " --out volume.vtu"), 2);
 }
 
-TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_counts_is_told) {
+TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_counts_is_named) {
   const std::string substrate =
       "mbtfm-substrate --gel gel.toml --adhesions adhesions.csv --forces forces.csv --surface surface.vtp --points "
       "points.csv --displacement_tolerance 0.1 --out u.csv";

@@ -192,7 +192,7 @@ TEST_F(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   EXPECT_TRUE(fires("pushes-outward", "mean cosine", pushed.output)) << pushed.output;
 }
 
-TEST_F(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
+TEST_F(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_named) {
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});  // 1.3 px: 0.26 and 0.065 um
   for (const double pixel_um : {0.2, 0.05}) {
     write(folder / "r.tif", pair.relaxed, pixel_um);
@@ -203,7 +203,7 @@ TEST_F(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
   }
 }
 
-TEST_F(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_told) {
+TEST_F(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_named) {
   const auto told = [&](const test::BeadPair& pair) {
     write(folder / "r.tif", pair.relaxed, 0.2);
     write(folder / "s.tif", pair.stressed, 0.2);
@@ -230,7 +230,7 @@ TEST_F(TrackEndToEnd, images_out_of_focus_of_oblong_pixels_or_of_weak_beads_are_
 }
 
 /// Dots in a lattice instead of beads: any of its periods fits, so the least shift is the right one.
-TEST_F(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told) {
+TEST_F(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_named) {
   constexpr int kWidth = 256, kPitch = 16;
   const std::vector<test::Peak> peaks = test::ring_of_adhesions(kWidth, kPitch / 6.0);
   const auto lattice = [&](Vec2 shift, bool is_pulled, std::uint64_t seed) {
@@ -265,7 +265,7 @@ TEST_F(TrackEndToEnd, dots_in_a_lattice_find_their_partners_and_a_choice_is_told
   EXPECT_TRUE(fires("pattern-repeats", told)) << told;
 }
 
-TEST_F(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
+TEST_F(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_named) {
   std::string still = "x_um,y_um,ux_um,uy_um\n", twice = still;
   for (int k = 0; k < 64; ++k) {
     const std::string place = std::to_string(k % 8) + "," + std::to_string(k / 8) + ",";

@@ -98,7 +98,7 @@ TEST_F(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) 
   EXPECT_NEAR(assumed_um / (kNoise * scene.largest_um), 1, 0.075);
 }
 
-TEST_F(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_incompressible_gel) {
+TEST_F(TractionProgram, refuses_a_modulus_in_pascal_unless_asked_to_and_takes_an_incompressible_gel) {
   files::write_displacement(folder / "displacement.csv", test::ellipse_scene(32, 0.05).field);
   const auto run_on = [&](const std::string& toml) {
     files::write_text(folder / "cell.toml", "[gel]\nyoungs_modulus_kPa = " + toml);
@@ -209,7 +209,7 @@ TEST_F(TractionInSpace, splits_faces_by_each_rule_and_writes_an_even_lattice) {
                         "direct states no resolution"));
 }
 
-TEST_F(TractionInSpace, lambda_that_it_tells_is_the_one_to_be_given) {
+TEST_F(TractionInSpace, lambda_that_it_shows_is_the_one_to_be_given) {
   const std::string dense = "--spacing_um 5 --method tikhonov ";
   const auto lambda = [&]() {
     return nlohmann::json::parse(files::read_text(folder_ / "traction_3d.json")).at("lambda_um_per_kPa").get<double>();
@@ -283,7 +283,7 @@ TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {
   EXPECT_TRUE(has_words(outcome.output, "the total force of the cell is"));
 }
 
-TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
+TEST_F(TractionInSpace, refuses_what_shows_nothing_and_leaves_no_file) {
   files::write_text(folder_ / "flat.csv", "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.2,0.01\n");
   files::write_text(folder_ / "few.csv", "x_um,y_um,z_um,ux_um,uy_um,uz_um\n1,2,5,0.1,0.2,0.01\n3,2,5,0.1,0.2,0.01\n");
   files::write_text(folder_ / "outline.csv", "x_um,y_um\n100,100\n120,100\n120,120\n");

@@ -187,7 +187,7 @@ TEST_P(Cables, forces_do_not_depend_on_the_smoothing_down_to_a_millionth_of_an_e
         << smoothing;
 }
 
-TEST_P(Cables, are_taut_slack_or_collapsed_as_their_forces_tell) {
+TEST_P(Cables, are_taut_slack_or_collapsed_as_their_forces_show) {
   for (std::size_t k = 0; k < net.links.size(); ++k) {
     const Link& link = net.links[k];
     const double tension = link.share * tensions[link.fibre_id];  // groups of the lattice are numbered as its fibres

@@ -79,7 +79,7 @@ TEST(ChannelAlignment, images_that_lie_on_each_other_stay) {
   EXPECT_LE(n_moved, 3) << "one in 370 by chance: more than three of a hundred once in 2e5";
 }
 
-TEST(ChannelAlignment, few_ends_tell_nothing) {
+TEST(ChannelAlignment, few_ends_show_nothing) {
   EXPECT_FALSE(align_channels({}, {}));
   const Scene s = scene(3, 0.1, 1);
   EXPECT_FALSE(align_channels(s.fibres, s.adhesions));

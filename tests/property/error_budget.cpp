@@ -77,7 +77,7 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
   EXPECT_NEAR(budget.total_force_nN, total_nN(adhesion_forces_nN(fit)), 1e-9);
 }
 
-TEST(ErrorBudget, one_mesh_tells_nothing_of_the_mesh) {
+TEST(ErrorBudget, one_mesh_shows_nothing_of_the_mesh) {
   const Fitted f = fitted(test::tension_scene("case_21", 600, 0.05, 3));
   EXPECT_FALSE(f.budget(kExact).tensions.front().parts_nN.mesh);
 }
@@ -134,7 +134,7 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
   EXPECT_NEAR(log_ratio / n_compared, 0, 0.25);
 }
 
-TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
+TEST(ErrorBudget, gives_the_bias_of_a_substrate_that_lacks_the_base) {
   TensionScene scene = test::tension_scene("case_21", 1500, kLittleNoise, 3);
   const Eigen::VectorXd on_layer = scene.displacement_um;
   scene.compliance_um_per_nN = greens::make_greens(test::kGel, {.model = substrate::ModelKind::half_space}, 2)
@@ -153,7 +153,7 @@ TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
 
 /// A fit that is stopped early is off by what was left to go. (Near a bound the part is larger than that: it takes the
 /// whole step, which the bound would have cut.)
-TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
+TEST(ErrorBudget, shows_what_a_fit_that_stops_early_leaves_undone) {
   Cell cell = test::round_cell(14, 16);
   for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
   const auto scene = [&] { return test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.02, 7); };
@@ -238,7 +238,7 @@ EnsembleFit answer_of(std::vector<int> ids, const std::vector<double>& tensions_
   return fit;
 }
 
-TEST(ErrorBudget, two_placements_of_the_candidates_tell_the_error_of_placing_them) {
+TEST(ErrorBudget, two_placements_of_the_candidates_show_the_error_of_placing_them) {
   // Of answers with the variance v, half the squared difference of two has the mean v.
   const PlacementSpread spread =
       spread_between(answer_of({0, 1, 2, 4}, {0.1, 5, 3, 2}, 100), answer_of({0, 1, 4}, {0.1, 8, 2}, 110));

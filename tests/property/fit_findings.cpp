@@ -77,13 +77,13 @@ TEST_F(FitFindings, a_sound_cell_has_none) {
   test::expect_silent({"wide-interval", "mesh-error", "forces-out-of-balance", "assumed-input"}, of_sound);
 }
 
-TEST_F(FitFindings, a_gel_that_grew_between_the_images_is_told_and_taken_off) {
+TEST_F(FitFindings, a_gel_that_grew_between_the_images_is_named_and_taken_off) {
   each_bead([](Bead& b) { b.displacement_um += 0.003 * (b.position_um - kCentre_um); });
   EXPECT_TRUE(fires("common-motion", found()));
 }
 
 /// The image of a lens that distorts by 0.7 % at the border.
-TEST_F(FitFindings, a_motion_of_all_beads_that_is_not_even_is_told) {
+TEST_F(FitFindings, a_motion_of_all_beads_that_is_not_even_is_named) {
   each_bead([](Bead& b) {
     const Vec2 d = 1.0 / 27 * (b.position_um - kCentre_um);
     b.displacement_um += 0.2 * dot(d, d) * d;
@@ -91,7 +91,7 @@ TEST_F(FitFindings, a_motion_of_all_beads_that_is_not_even_is_told) {
   EXPECT_TRUE(fires("common-motion", "uneven motion", found()));
 }
 
-TEST_F(FitFindings, a_cell_beside_its_place_on_the_beads_is_moved_there_and_told) {
+TEST_F(FitFindings, a_cell_beside_its_place_on_the_beads_is_moved_there_and_named) {
   each_bead([](Bead& b) { b.position_um += Vec2{0.6, -0.4}; });
   EXPECT_TRUE(fires("channel-shift", found()));
 }
@@ -167,7 +167,7 @@ TEST_F(FitFindings, what_is_left_beside_a_named_force_is_open_only_if_more_is_le
   EXPECT_TRUE(is_open_among(found(), "misfit-in-a-region"));
 }
 
-TEST_F(FitFindings, a_gel_too_soft_for_small_strains_is_told) {
+TEST_F(FitFindings, a_gel_too_soft_for_small_strains_is_named) {
   each_bead([](Bead& b) {
     b.displacement_um = 8 * b.displacement_um;
     b.sigma_um *= 8;
@@ -183,18 +183,18 @@ TEST_F(FitFindings, beads_without_errors_are_doubted_if_none_lie_far_from_the_ce
   EXPECT_TRUE(fires("noise-unknown", found()));
 }
 
-TEST_F(FitFindings, beads_that_scatter_more_than_they_state_are_told) {
+TEST_F(FitFindings, beads_that_scatter_more_than_they_state_are_named) {
   each_bead([](Bead& b) { b.sigma_um /= 1.6; });
   EXPECT_TRUE(fires("noise-understated", "as they state", found()));
 }
 
-TEST_F(FitFindings, beads_that_are_wrong_in_one_region_are_told_with_the_place) {
+TEST_F(FitFindings, beads_that_are_wrong_in_one_region_are_named_with_the_place) {
   blur_a_corner();
   EXPECT_TRUE(fires("misfit-in-a-region", found()));
 }
 
 /// Half of those within 2 um, by five standard errors, as beads that are matched with their neighbours.
-TEST_F(FitFindings, beads_that_are_wrong_beside_adhesions_are_told) {
+TEST_F(FitFindings, beads_that_are_wrong_beside_adhesions_are_named) {
   const Eigen::VectorXd tensions_nN = Eigen::Vector4d(0.06, 2.5, 1.7, 2);
   constexpr unsigned kSeeds = 5;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
@@ -212,13 +212,13 @@ TEST_F(FitFindings, beads_that_are_wrong_beside_adhesions_are_told) {
   }
 }
 
-TEST_F(FitFindings, adhesions_beyond_the_beads_are_told) {
+TEST_F(FitFindings, adhesions_beyond_the_beads_are_named) {
   const Vec2 bare = cell_.adhesions.front().position_um;
   std::erase_if(inputs_.beads, [&](const Bead& b) { return norm(b.position_um - bare) < 6; });
   EXPECT_TRUE(fires("adhesions-without-beads", found()));
 }
 
-TEST_F(FitFindings, a_fibre_that_came_after_the_network_is_told) {
+TEST_F(FitFindings, a_fibre_that_came_after_the_network_is_named) {
   test::add_ventral(inputs_.cell, 3, 10);
   EXPECT_TRUE(fires("fibre-without-tension", found()));
 }
@@ -231,7 +231,7 @@ TEST_F(FitFindings, a_network_with_a_fibre_that_is_none_of_the_cells_is_refused)
   EXPECT_TRUE(has_words(error.found, "fibre 3"));
 }
 
-TEST_F(FitFindings, a_fibre_that_was_drawn_twice_is_told_apart_from_itself_by_no_beads) {
+TEST_F(FitFindings, a_fibre_that_was_drawn_twice_is_resolved_by_no_beads) {
   test::add_ventral(cell_, 1, 5);
   Polyline& bowed = cell_.fibres.back().points_um;
   bowed.insert(bowed.begin() + 1, 0.5 * (bowed.front() + bowed.back()) + Vec2{0.05, 0.05});
@@ -242,7 +242,7 @@ TEST_F(FitFindings, a_fibre_that_was_drawn_twice_is_told_apart_from_itself_by_no
 }
 
 /// The stressed image shows the relaxed gel.
-TEST_F(FitFindings, beads_that_did_not_move_tell_no_tension) {
+TEST_F(FitFindings, beads_that_did_not_move_show_no_tension) {
   test::Normal normal(3);
   each_bead([&](Bead& b) { b.displacement_um = b.sigma_um * Vec2{normal(), normal()}; });
   const std::vector<Finding> findings = found();
@@ -250,7 +250,7 @@ TEST_F(FitFindings, beads_that_did_not_move_tell_no_tension) {
 }
 
 /// As of a weak fibre under much noise.
-TEST_F(FitFindings, an_interval_wider_than_twice_its_tension_is_told) {
+TEST_F(FitFindings, an_interval_wider_than_twice_its_tension_is_named) {
   const FittedCell cell = fit_cell(inputs_, parameters_, 2);
   std::vector<Tension> tensions = cell.found.tensions;
   const auto of_these = [&] {
@@ -274,7 +274,7 @@ TEST_F(FitFindings, a_fibre_that_would_have_to_push_is_at_zero) {
   EXPECT_TRUE(fires("wide-interval", "are zero", found()));
 }
 
-TEST_F(FitFindings, one_mesh_and_a_modulus_without_an_error_are_told) {
+TEST_F(FitFindings, one_mesh_and_a_modulus_without_an_error_are_named) {
   parameters_.fit.n_meshes = 1;
   parameters_.gel.youngs_modulus_sigma_kPa.reset();
   const std::vector<Finding> findings = found();
@@ -283,7 +283,7 @@ TEST_F(FitFindings, one_mesh_and_a_modulus_without_an_error_are_told) {
 }
 
 /// No input makes these: a fault of the program would.
-TEST_F(FitFindings, forces_and_torques_out_of_balance_are_told) {
+TEST_F(FitFindings, forces_and_torques_out_of_balance_are_named) {
   const FittedCell cell = fit_cell(inputs_, parameters_, 2);
   const auto of = [&](const tensions::EnsembleFit& fit) {
     return tensions::findings_of({fit, cell.fit.data, cell.seen, cell.found.summary, cell.found.tensions,

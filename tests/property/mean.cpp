@@ -88,7 +88,7 @@ Brightness blobs(const Motion& motion, double noise, std::uint64_t seed) {
   return image;
 }
 
-TEST(Mean, images_tell_a_known_shift_and_turn) {
+TEST(Mean, images_show_a_known_shift_and_turn) {
   const Brightness reference = blobs({}, 0.05, 1);
   for (const double angle : {12.3, -140.0}) {
     const Motion truth{{62, 60}, {64.3, 58.1}, angle * kDegree, false};

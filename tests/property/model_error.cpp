@@ -52,7 +52,7 @@ struct Model {
   }
 };
 
-TEST(ModelError, tells_the_errors_of_the_tensions_from_two_meshes_as_from_eight) {
+TEST(ModelError, gives_the_errors_of_the_tensions_from_two_meshes_as_from_eight) {
   for (const int n_meshes : {2, 8}) {
     double z_squared = 0;
     constexpr int kDraws = 300;
@@ -333,7 +333,7 @@ TEST(ModelError, is_what_the_tensions_of_a_cell_with_another_network_are_off_by)
     }
 }
 
-TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_error) {
+TEST(ModelError, what_the_beads_show_of_a_tension_adds_up_to_their_part_of_its_error) {
   Cell cell = test::round_cell(12, 12);
   for (int i = 1; i <= 3; ++i) test::add_ventral(cell, i, i + 6);
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 2, 5, 4), 800, 0.05, 3);

@@ -193,7 +193,7 @@ TEST(Placement, is_found_within_its_stated_error) {
   for (const double square : squares) EXPECT_NEAR(square, 1, 4 * 0.22);
 }
 
-TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
+TEST(Placement, beads_that_do_not_determine_it_leave_the_cell_where_it_is) {
   const ShiftedCell noisy = shifted_cell({0.2, 0.1}, 0, 3, 1);
   const LinearData data = noisy.data_of(noisy.scene.beads);
   const Trial start = uniform_start({noisy.scene.cables, data.reduced, noisy.scene.adhesion_ids});
@@ -210,7 +210,7 @@ TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
   }
 }
 
-TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_known) {
+TEST(Placement, its_part_of_an_error_is_what_beads_would_show_more_if_it_were_known) {
   const ShiftedCell still = shifted_cell({}, 0, 0.05, 3);
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());

@@ -189,7 +189,7 @@ TEST(AdhesionPair, of_many_beads_only_the_density_over_the_squared_noise_counts)
 
 /// Where noise is large the single adhesion goes to the place that the noise likes best, the nearer to the truth the
 /// fewer experiments tell two from one.
-TEST(AdhesionPair, at_the_least_distance_four_in_five_experiments_tell_the_two_apart) {
+TEST(AdhesionPair, at_the_least_distance_four_in_five_experiments_resolve_the_two) {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = kGel.poisson_ratio, .thickness_um = 60};
   constexpr int kExperiments = 400;
   for (const double noise_um : {0.02, 0.04}) {

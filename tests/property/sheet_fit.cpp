@@ -142,7 +142,7 @@ TEST(SheetFit, exact_displacements_give_contraction_stiffness_and_line_tension_b
   }
 }
 
-TEST(SheetFit, a_stiff_sheet_tells_contraction_over_stiffness_and_a_lower_limit) {
+TEST(SheetFit, a_stiff_sheet_shows_contraction_over_stiffness_and_a_lower_limit) {
   const FittedDisc disc(25);
   std::mt19937_64 random(7);
   const SheetFit fit = disc.fit(with_noise(disc.exact(200, 20), random));
@@ -158,7 +158,7 @@ TEST(SheetFit, a_stiff_sheet_tells_contraction_over_stiffness_and_a_lower_limit)
   EXPECT_LT((*ratio.high - *ratio.low) / truth, 0.3);
 }
 
-TEST(SheetFit, parts_that_contract_each_by_its_own_are_told_apart_where_they_differ) {
+TEST(SheetFit, parts_that_contract_each_by_its_own_are_resolved_where_they_differ) {
   const FittedDisc disc(25);
   std::vector<std::vector<double>> parts(2, sheet::even(*disc.elements, 0));
   for (int t = 0; t < disc.elements->n_triangles(); ++t)
@@ -204,7 +204,7 @@ TEST(SheetFit, exact_displacements_give_the_stiffness_of_the_adhesions_back) {
   }
 }
 
-TEST(SheetFit, beads_tell_the_penetration_where_they_do_not_tell_sheet_and_adhesions_apart) {
+TEST(SheetFit, beads_show_the_penetration_where_they_do_not_separate_sheet_and_adhesions) {
   constexpr int kRuns = 12;
   const FittedDisc disc(25);
   const StiffnessTable table = on_springs(disc);
@@ -408,7 +408,7 @@ class SheetBudget : public testing::Test {
   const Gel gel_{8.4, 0.49, 60};
 };
 
-TEST_F(SheetBudget, its_parts_add_up_to_the_standard_errors_and_none_is_told_that_was_not_asked_for) {
+TEST_F(SheetBudget, its_parts_add_up_to_the_standard_errors_and_none_is_named_that_was_not_asked_for) {
   Gel doubtful = gel_;
   doubtful.youngs_modulus_sigma_kPa = 0.84;
   doubtful.poisson_ratio_sigma = 0.02;

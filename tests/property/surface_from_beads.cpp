@@ -100,7 +100,7 @@ TEST(SurfaceFromBeads, knows_no_unit_and_bears_a_bead_far_above) {
   EXPECT_LE(misfit_of(with, wave).rms_um, 1.3 * alone.rms_um);
 }
 
-TEST(SurfaceFromBeads, refuses_what_tells_no_surface) {
+TEST(SurfaceFromBeads, refuses_what_shows_no_surface) {
   EXPECT_THROW(fitted({{0, 0, 1}, {1, 1, 2}}), InvalidData);
   std::vector<Vec3> beads = beads_below(wave, 0.003, 1);
   beads[7].z = std::nan("");

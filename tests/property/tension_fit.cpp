@@ -67,7 +67,7 @@ TEST(TensionFit, total_and_network_force_are_unbiased_at_a_quarter_of_noise) {
   EXPECT_LE(std::abs(network), 0.05 + 3 * std::sqrt(network_squared / kRepeats));
 }
 
-TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
+TEST(TensionFit, the_bias_of_forces_that_bend_is_stated_where_noise_is_large) {
   // what is taken off the network's force beside the bounds, against fits of noise anew; those of the linearised
   // problem, whose mean error is zero, are taken off them and leave little of chance
   const TensionScene scene = tension_scene("case_21", 1000, 0.05, 2);
@@ -190,7 +190,7 @@ TEST(TensionFit, beads_stray_that_are_alone_and_further_off_than_chance_has_it) 
   EXPECT_TRUE(stray_beads(data, {rounding, leverage}).empty());
 }
 
-TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
+TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_predicted) {
   FitParameters parameters;
   parameters.loss = Loss::squares;
   int n_tried = 0, n_alone = 0;

@@ -198,7 +198,7 @@ TEST(Fttc, a_field_cut_at_the_border_does_not_inflate_the_contractile_moment) {
   EXPECT_LE(moment(cut, false), 1.1 * truth);
 }
 
-TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
+TEST(Fttc, scattered_beads_and_a_lattice_show_the_same) {
   const EllipseScene scene = ellipse_scene(96, 0);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));

@@ -58,7 +58,7 @@ TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_thei
   EXPECT_LE(apart(dense.solve(our_risk), truth), 1.03 * apart(dense.solve(their_risk), truth));
 }
 
-TEST(Spectra, tell_an_error_that_can_be_followed_from_noise_that_is_everywhere) {
+TEST(Spectra, separate_an_error_that_can_be_followed_from_noise_that_is_everywhere) {
   const MatrixXd A = smoothing_matrix(500, 240);
   const MatrixXd followed = A.householderQr().householderQ() * MatrixXd::Identity(500, 240);
   std::normal_distribution<double> normal;
@@ -807,7 +807,7 @@ TEST_F(FindingsInSpace, are_none_of_a_sound_scene) {
   EXPECT_FALSE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, r))));
 }
 
-TEST_F(FindingsInSpace, tell_beads_beside_the_gel_stated_errors_that_are_too_small_and_beads_followed_to_another) {
+TEST_F(FindingsInSpace, name_beads_beside_the_gel_stated_errors_that_are_too_small_and_beads_followed_to_another) {
   const std::vector<BeadInSpace> sound = scene.beads(kSigma_um);
   std::vector<BeadInSpace> off = sound, overconfident = sound, stray = sound;
   for (int b = 0; b < 10; ++b) off[b].position_um.z = b % 2 ? -2 : scene.gel.thickness_um + 2;
@@ -818,18 +818,18 @@ TEST_F(FindingsInSpace, tell_beads_beside_the_gel_stated_errors_that_are_too_sma
   EXPECT_TRUE(fires("outliers", "noise has them", found(stray).findings));
 }
 
-TEST_F(FindingsInSpace, tell_beads_that_lie_deep) {
+TEST_F(FindingsInSpace, name_beads_that_lie_deep) {
   scene.shallowest_um = 12;
   scene.depth_um = 22;
   EXPECT_TRUE(fires("low-resolution", "from the surface", found(scene.beads(kSigma_um)).findings));
 }
 
-TEST_F(FindingsInSpace, tell_few_beads_of_much_noise) {
+TEST_F(FindingsInSpace, name_few_beads_of_much_noise) {
   scene.n_beads = 80;
   EXPECT_TRUE(fires("low-resolution", "unknowns", found(scene.beads(0.3)).findings));
 }
 
-TEST_F(FindingsInSpace, tell_a_force_that_nothing_balances) {
+TEST_F(FindingsInSpace, name_a_force_that_nothing_balances) {
   scene.spots.pop_back();
   const Problem problem = scene.problem(scene.beads(kSigma_um), parameters);
   EXPECT_TRUE(fires("tractions-out-of-balance", noticed_imbalance(balance_of(problem, found(problem)))));
@@ -854,7 +854,7 @@ TEST_F(FindingsInSpace, are_none_of_a_balance_that_the_error_of_the_gel_disturbs
   }
 }
 
-TEST_F(FindingsInSpace, tell_a_patch_that_is_missing) {
+TEST_F(FindingsInSpace, name_a_patch_that_is_missing) {
   traction.method = tractions::TractionMethod::patches;
   scene.spots.push_back({{0, 12}, 4, {0, -40, 0}});
   const std::vector<BeadInSpace> beads = scene.beads(kSigma_um);
@@ -875,7 +875,7 @@ double figure_of(const SpatialReconstruction& r, const std::string& name) {
 }
 
 /// A force that raises the squares of the misfit by less than a tenth mostly has directions in which it is seen.
-TEST_F(FindingsInSpace, tell_a_weak_patch_that_is_missing_by_what_its_beads_do_together) {
+TEST_F(FindingsInSpace, name_a_weak_patch_that_is_missing_by_what_its_beads_do_together) {
   traction.method = tractions::TractionMethod::patches;
   parameters.background = 0;
   constexpr int kDraws = 16;
@@ -995,7 +995,7 @@ TEST_F(FindingsInSpace, patches_that_are_all_there_is_have_the_errors_of_least_s
 }
 
 /// Whatever the axes: the squared distance in the joint errors is at least that along each direction.
-TEST_F(InSpace, an_imbalance_that_one_axis_tells_is_not_hidden_by_the_errors_of_another) {
+TEST_F(InSpace, an_imbalance_that_one_axis_shows_is_not_hidden_by_the_errors_of_another) {
   const Problem problem = scene.problem(scene.beads(0.03), parameters);
   const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
   const Balance balance = balance_of(problem, r);

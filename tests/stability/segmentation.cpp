@@ -87,7 +87,7 @@ class ImagesOfTwoCells : public testing::Test {
   static constexpr double kPixel_um = 0.1;
 };
 
-TEST_F(ImagesOfTwoCells, are_told_from_those_of_one) {
+TEST_F(ImagesOfTwoCells, differ_from_those_of_one) {
   const double most_adhesions = threshold(Symptom::adhesions_off_actin),
                most_outline = threshold(Symptom::outline_off_actin);
   for (const std::uint64_t seed : {71, 72, 73}) {

@@ -135,7 +135,7 @@ test::Peaks followed_in_cell(std::uint64_t seed, bool adhesions_are_known) {
   return test::counted(tracking, pair, p.microscope).peaks;
 }
 
-TEST(TrackStability, adhesions_tell_which_loose_bead_is_which) {
+TEST(TrackStability, adhesions_show_which_loose_bead_is_which) {
   const test::Peaks alone = followed_in_cell(1, false), guided = followed_in_cell(1, true);
   EXPECT_LE(guided.n - guided.n_right, 0.75 * (alone.n - alone.n_right));
   EXPECT_LE(guided.n_wrong, alone.n_wrong);
@@ -145,7 +145,7 @@ TEST(TrackStability, adhesions_tell_which_loose_bead_is_which) {
 }
 
 /// A bead comes to rest where the next one lay: windows take one for the other, and both bear each other out.
-TEST(TrackStability, beads_that_took_each_others_places_are_told_apart_beside_adhesions) {
+TEST(TrackStability, beads_that_took_each_others_places_are_exchanged_beside_adhesions) {
   int n = 0, n_right = 0, n_wrong = 0;
   for (const std::uint64_t seed : {44u, 49u}) {
     const test::Peaks peaks = followed_in_cell(seed, true);

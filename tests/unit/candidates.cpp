@@ -202,7 +202,7 @@ TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
   EXPECT_LT(beneath({4.5, 4.5}).value_or(1), beneath({0, 0}).value_or(0) - 0.05);
 }
 
-TEST(Pattern, tells_how_much_of_the_cell_lies_on_it_and_how_large_its_parts_are) {
+TEST(Pattern, measures_how_much_of_the_cell_lies_on_it_and_how_large_its_parts_are) {
   const images::Image field = test::even_image(256, 256, 0);
   const Field of_pixels{.width_px = 256, .height_px = 256, .pixel_um = 0.1};
   CellOutline cell;

@@ -121,7 +121,7 @@ TEST(CostStudy, of_cells_with_fibres_and_in_space_together_is_refused) {
   EXPECT_THROW(combined({one, other}), UsageError);
 }
 
-TEST(CostStudy, of_a_cell_in_space_tells_of_tractions_and_not_of_tensions) {
+TEST(CostStudy, of_a_cell_in_space_shows_tractions_and_no_tensions) {
   Study study{.kind = CellKind::space,
               .reference = "the truth",
               .has_images = false,

@@ -125,7 +125,7 @@ TEST_P(Dense, triangles_give_what_full_matrices_give) {
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 300, 700));
 
-TEST(DenseCholesky, a_matrix_that_is_not_positive_is_told_and_its_lower_half_kept) {
+TEST(DenseCholesky, a_matrix_that_is_not_positive_is_refused_and_its_lower_half_kept) {
   MatrixXd A(2, 2);
   A << 1, 2, 2, 1;
   EXPECT_FALSE(numerics::upper_cholesky(A));

@@ -215,7 +215,7 @@ TEST(FibreParts, a_way_that_reaches_no_adhesion_changes_nothing) {
   EXPECT_EQ(t.fibre.points_um, before);
 }
 
-TEST(FibreParts, a_bright_line_that_is_in_no_fibre_is_told_and_a_faint_one_is_not) {
+TEST(FibreParts, a_bright_line_that_is_in_no_fibre_is_named_and_a_faint_one_is_not) {
   constexpr int kSide = 256;
   cv::Mat image(kSide, kSide, CV_32F, cv::Scalar(100));
   std::vector<std::vector<cv::Point2d>> fibres;

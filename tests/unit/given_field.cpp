@@ -36,7 +36,7 @@ TEST(GivenField, columns_are_mapped_and_pixels_become_um) {
   }
 }
 
-TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
+TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_shows_its_noise) {
   const test::TemporaryFolder folder;
   const auto peaks = test::ring_of_adhesions(512, 8.3);
   std::mt19937_64 random(3);

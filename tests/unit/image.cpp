@@ -450,7 +450,7 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   EXPECT_THROW(read_image(folder / "a.jpg", {.page = 2}), InputError);
 }
 
-TEST(Channels, a_pixel_size_that_no_image_states_is_told) {
+TEST(Channels, a_pixel_size_that_no_image_states_is_named) {
   const Channel with{"a.tif", {.width = 1, .height = 1, .pixels = {0}, .pixel_size_um = 0.1}},
       without{"b.tif", {.width = 1, .height = 1, .pixels = {0}}};
   EXPECT_TRUE(fires("pixel-size-unchecked", noticed_unchecked({&without}, 0.2)));

@@ -192,7 +192,7 @@ TEST_F(ImagePlanes, a_thumbnail_is_not_the_picture) {
   EXPECT_EQ(value_of(folder / "a.tif", {.page = 1}), 2) << "a page that is asked for";
 }
 
-TEST_F(ImagePlanes, ome_tells_of_each_plane_once_and_each_slice_has_a_page_of_its_own) {
+TEST_F(ImagePlanes, ome_describes_each_plane_once_and_each_slice_has_a_page_of_its_own) {
   const std::string one_slice = "SizeC='1' SizeZ='3' SizeT='1'";
   write_pages(folder / "same.tif", 3,
               ome(one_slice, "<TiffData IFD='0' FirstZ='0' PlaneCount='2'/><TiffData IFD='1' FirstZ='2'/>"));
@@ -219,7 +219,7 @@ TEST_F(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen
   EXPECT_TRUE(has_words(refusal(file, {.channel = "4"}), "3 channels"));
 }
 
-TEST_F(ImagePlanes, a_claim_of_millions_of_channels_is_told_in_a_line) {
+TEST_F(ImagePlanes, a_claim_of_millions_of_channels_is_named_in_a_line) {
   write_pages(folder / "a.ome.tif", 1, ome("SizeC='4000000' SizeZ='1' SizeT='1'", ""));
   const std::string told = refusal(folder / "a.ome.tif", {});
   EXPECT_TRUE(has_words(told, "4000000 channels: 1, 2, 3,")) << told.substr(0, 300);

@@ -206,7 +206,7 @@ TEST(Mask, binning_the_images_leaves_the_mask_as_fine_as_it_is) {
   EXPECT_NEAR(mask_adhesions(m, std::nullopt, coarse)[0].area_um2, fine.area_um2, 1e-9);
 }
 
-TEST(Mask, what_is_no_mask_is_told) {
+TEST(Mask, what_is_no_mask_is_named) {
   images::Image image = empty();
   EXPECT_EQ(refusal_of([&] { mask(image); }), "mask.tif: pixels above 0 for what the mask covers; 0 everywhere");
   image.at(3, 5) = 0.25f;

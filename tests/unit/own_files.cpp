@@ -165,7 +165,7 @@ TEST_F(Records, answer_what_they_hold) {
   EXPECT_EQ(r.text_or("c", "else"), "else");
 }
 
-TEST_F(Records, tell_place_and_finding_of_what_is_otherwise) {
+TEST_F(Records, say_place_and_finding_of_what_is_otherwise) {
   const files::JsonRecord r = record(R"({"a": {"b": [1, "x"]}})");
   const InputError error = test::thrown<InputError>([&] { r.at("a").at("b").list()[1].number(); });
   EXPECT_EQ(error.expected, "'a.b.1' of a record to be a number");

@@ -109,7 +109,7 @@ TEST(Parameters, an_unknown_key_names_the_line_and_the_nearest_known_one) {
       "cell.toml:1: expected a known key above the first table, found 'pixelsize_um' | did you mean 'pixel_size_um'?");
 }
 
-TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_is_like_none_is_not_guessed) {
+TEST(Parameters, a_key_in_the_wrong_table_is_sent_where_it_belongs_and_one_that_is_like_none_is_not_guessed) {
   EXPECT_EQ(message_of("[network]\nradius_um = 2\n"),
             "cell.toml:2: expected a known key of [network], found 'radius_um' | it belongs under [gel]");
   EXPECT_EQ(message_of("[network]\nfibres = false\n"),
@@ -120,7 +120,7 @@ TEST(Parameters, a_key_in_the_wrong_table_is_told_where_it_belongs_and_one_that_
             "is_on, method, other, seed");
 }
 
-TEST(Parameters, a_deleted_key_is_told_from_a_misspelt_one) {
+TEST(Parameters, a_deleted_key_is_not_taken_for_a_misspelt_one) {
   EXPECT_EQ(message_of("[network]\nseeds = 'jittered'\n"),
             "cell.toml:2: expected a known key of [network], found 'seeds' | this version computes as its default did "
             "and has no such key: take the line out (CHANGELOG.md)");

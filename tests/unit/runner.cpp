@@ -230,7 +230,7 @@ TEST_F(Runner, keeps_an_output_that_was_changed_by_hand) {
   EXPECT_EQ(started(), "fit network segment");
 }
 
-TEST_F(Runner, a_cell_is_not_done_before_the_run_record_tells_what_was_changed_by_hand) {
+TEST_F(Runner, a_cell_is_not_done_before_the_run_record_shows_what_was_changed_by_hand) {
   started();
   files::write_text(cell_ / "report.html", "");
   EXPECT_TRUE(is_done(cell_, options_, look_at_cell(cell_, options_)));
@@ -325,7 +325,7 @@ TEST_F(Runner, works_on_a_stage_while_another_run_holds_other_stages) {
 
 nlohmann::json run_record(const fs::path& cell) { return nlohmann::json::parse(files::read_text(cell / "run.json")); }
 
-TEST_F(Runner, tells_in_run_json_which_stage_failed_and_why) {
+TEST_F(Runner, says_in_run_json_which_stage_failed_and_why) {
   files::write_text(bin_ / "exit-network", "3");
   EXPECT_EQ(test::thrown<StageFailed>([&] { started(); }).failure.exit_code, 3);
   EXPECT_EQ(calls(), "network segment track");
@@ -342,7 +342,7 @@ TEST_F(Runner, tells_in_run_json_which_stage_failed_and_why) {
   EXPECT_FALSE(run_record(cell_)["stages"]["network"].contains("failure"));
 }
 
-TEST_F(Runner, tells_in_run_json_of_a_crash_and_of_refused_parameters) {
+TEST_F(Runner, names_in_run_json_a_crash_and_refused_parameters) {
   files::write_text(bin_ / "shell-track", "kill -SEGV $$");
   EXPECT_THROW(started(), StageFailed);
   EXPECT_EQ(run_record(cell_)["stages"]["track"]["failure"]["exit_code"], 128 + 11);
@@ -362,7 +362,7 @@ TEST_F(Runner, stages_that_are_run_one_by_one_leave_the_same_record) {
 }
 
 /// As the workflow runs a sheet of given beads: it has no job for the stage `track`.
-TEST_F(Runner, what_was_given_is_told_though_no_run_asked_for_its_stage) {
+TEST_F(Runner, what_was_given_is_named_though_no_run_asked_for_its_stage) {
   make_executable(bin_ / "mbtfm-sheet", stage_script());
   for (const char* image : {"beads_stressed.tif", "beads_relaxed.tif"}) fs::remove(cell_ / image);
   fs::create_directories(cell_ / "2_track");
@@ -380,7 +380,7 @@ TEST_F(Runner, what_was_given_is_told_though_no_run_asked_for_its_stage) {
             std::vector<std::string>{"2_track/displacement.csv differs (output of track)"});
 }
 
-TEST_F(Runner, what_was_changed_by_hand_is_told_though_no_run_asked_for_its_stage) {
+TEST_F(Runner, what_was_changed_by_hand_is_named_though_no_run_asked_for_its_stage) {
   started();
   files::write_text(cell_ / "2_track/displacement.csv", "by hand");
   options_.only = {"fit"};
@@ -421,7 +421,7 @@ TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
   EXPECT_EQ(calls(), "") << "nothing runs before every stage has read its parameters";
 }
 
-TEST_F(Runner, a_stage_that_crashes_while_it_reads_its_parameters_is_told_as_that) {
+TEST_F(Runner, a_stage_that_crashes_while_it_reads_its_parameters_is_named_as_that) {
   files::write_text(bin_ / "check-fit", "kill -SEGV $$");
   const StageFailed error = test::thrown<StageFailed>([&] { started(); });
   EXPECT_EQ(error.failure.exit_code, 128 + 11);

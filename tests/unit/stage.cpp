@@ -96,7 +96,7 @@ TEST_F(Stage, what_was_assumed_and_what_is_unusual_are_findings_in_the_record) {
   EXPECT_TRUE(test::fires("unusual-value", doubtful)) << doubtful;
 }
 
-TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
+TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_has_its_code) {
   const std::vector<std::pair<int, std::function<void()>>> failures = {
       {2, [] { throw UsageError("usage"); }},
       {3, [] { throw InputError("a.csv:3", "a number", "'x'"); }},

@@ -280,7 +280,7 @@ TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
   EXPECT_THROW(read_study(folder.path(), {}, {}, 1), InputError);
 }
 
-TEST(Study, where_no_cell_enters_each_reason_is_told) {
+TEST(Study, where_no_cell_enters_each_reason_is_named) {
   const FakeStudy fake;
   const InputError error = test::thrown<InputError>(
       [&] { fake.read({}, "cell,exclude\ncell_1,blurred\ncell_2,blurred\ncell_3,dividing\n"); });
@@ -748,7 +748,7 @@ TEST_F(SheetStudy, its_figures_are_those_of_each_sheet_under_their_names_units_a
 }
 
 /// Of twelve sheets of 2 nN/um one says 22 ± 20: the plain mean is off by 1.7.
-TEST_F(SheetStudy, a_sheet_that_the_beads_hardly_tell_counts_little_in_the_mean) {
+TEST_F(SheetStudy, a_sheet_that_the_beads_hardly_show_counts_little_in_the_mean) {
   Study study = test::simulated_sheets({.n_conditions = 1});
   SheetEstimate& poor = study.cells[3].sheet->estimates[0];
   poor.value += 20;
@@ -946,7 +946,7 @@ TEST_F(SpaceStudy, beside_cells_with_fibres_and_sheets_no_figure_mixes_them) {
                         "Stress-fibre tensions of 5 cells, contraction of 4 sheets and forces of 6 cells in space"));
 }
 
-TEST_F(SpaceStudy, of_cells_without_images_that_older_versions_made_has_what_they_tell) {
+TEST_F(SpaceStudy, of_cells_without_images_that_older_versions_made_has_what_they_show) {
   Study made = test::simulated_cells_in_space({.n_cells = 6, .n_adhesions = 0});
   for (StudyCell& cell : made.cells) {
     cell.cell.outline_um.clear();

@@ -22,7 +22,7 @@ float& voxel(VoxelStack& s, int i, int j, int k) { return s.share[(k * s.n_y + j
 double slope(Vec2 p) { return 10 + 0.6 * p.x - 0.3 * p.y; }
 double bump(Vec2 p) { return 20 - 8 * std::exp(-0.02 * (std::pow(p.x - 15, 2) + std::pow(p.y - 12, 2))); }
 
-TEST(Masks, tell_the_surface_far_finer_than_their_slices) {
+TEST(Masks, show_the_surface_far_finer_than_their_slices) {
   for (const HeightOf& height : {HeightOf(slope), HeightOf(bump)}) {
     const VoxelPoints found = points_of_masks(masks_of(height));
     EXPECT_EQ(found.n_voxels_left_out, 0);

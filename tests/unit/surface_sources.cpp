@@ -183,7 +183,7 @@ TEST(SurfacePoints, the_surface_lies_nearer_than_they_and_knows_its_error) {
   }
 }
 
-TEST(SurfacePoints, strays_are_told_and_pull_little) {
+TEST(SurfacePoints, strays_are_named_and_pull_little) {
   const Scattered s = scattered(800, 0.2, 0.1, 5);
   const PointFit fit = fit_points(s.points, s.sigma);
   EXPECT_LT(misfit_of(fit).rms_um, 0.2);
