@@ -59,7 +59,7 @@ SpacePlan space_plan_of(const Parameters& parameters, stage::StageContext& conte
   const Asked asked = asked_in_space(parameters, scene);
   for (const double E : asked.youngs_modulus_kPa) context.expect_plausible("youngs_modulus_kPa", E);
   const std::vector<SpacePool> pools = pools_of(scene, asked, work);
-  work.tell(0.4, "what beads tell");
+  work.tell(0.4, "what beads show");
   const SpaceForeseen foreseen = foresee(scene, asked, pools, work);
   SpacePlan plan{.name = scene.name,
                  .own_kPa = scene.gel.youngs_modulus_kPa,

@@ -19,7 +19,7 @@ struct EffectRow {
   Effect (*decided)(const FittedCell&);
   /// Of the tensions, were it on. Null: it cannot change them, or no datum shows it.
   std::optional<tensions::Change> (*change)(const FittedCell&, const Effect&, int threads) = nullptr;
-  std::string_view without_change = "would change nothing that can be told: there is no datum of it";
+  std::string_view without_change = "would change nothing that the data show";
 };
 /// In the order of reports.
 const std::vector<EffectRow>& table_of_effects();

@@ -34,7 +34,7 @@ void check_solvable(const Eigen::ArrayXd& values) {
   const auto n_lost = (values <= 0).count();
   if (n_lost == 0) return;
   throw NotSolved({.reason = std::to_string(n_lost) + " of " + std::to_string(values.size()) +
-                             " force components are not felt by any bead or not told apart: adhesions that lie on each "
+                             " force components are not felt by any bead or not resolved: adhesions that lie on each "
                              "other, or far from all beads"});
 }
 

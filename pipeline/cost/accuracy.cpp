@@ -52,7 +52,7 @@ RelativeError relative_error(const ErrorBudget& budget) {
     model += p.model * p.model;
     error.is_complete = error.is_complete && p.mesh.has_value();
   }
-  if (tensions <= 0) throw InvalidData("tensions", "a fibre that pulls, to tell a relative error of", "none");
+  if (tensions <= 0) throw InvalidData("tensions", "a fibre that pulls, for a relative error", "none");
   error.total = std::sqrt(all / tensions);
   error.beads = std::sqrt(beads / tensions);
   error.segmentation = std::sqrt(segmentation / tensions);

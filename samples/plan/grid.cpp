@@ -96,7 +96,7 @@ void check_densities(const Scene& scene, const std::vector<double>& beads_per_um
                      brief(area_um2) + " um² of the scene");
   if (beads_per_um2.back() > most)
     throw UsageError("beads_per_um2: " + brief(beads_per_um2.back()) + " are more than the " + brief(most) +
-                     " that can be told apart: beads nearer than " + brief(scene.experiment.bead_distance_um) +
+                     " that can be resolved: beads nearer than " + brief(scene.experiment.bead_distance_um) +
                      " um to each other melt together in an image");
 }
 

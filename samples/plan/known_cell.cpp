@@ -248,7 +248,7 @@ Densities precision_at(const Scene& scene, const KnownCell& cell, const std::vec
   constexpr int kDraws = 8;  // a fibre's error differs by a quarter from draw to draw
   Densities result{.beads_per_um2 = beads_per_um2, .precision = std::vector<Precision>(beads_per_um2.size())};
   for (int draw = 0; draw < kDraws; ++draw) {
-    work.tell(double(draw) / kDraws, "what beads tell");
+    work.tell(double(draw) / kDraws, "what beads show");
     const auto index = static_cast<std::uint64_t>(draw);
     const BeadsOnGel densest = beads_on_gel(scene, cell, beads_per_um2.back(), index, work.threads);
     drawing::Random random(scene.experiment.seed, drawing::Stream::beads, index);

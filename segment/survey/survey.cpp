@@ -95,7 +95,7 @@ void look_at_beads(const CellImages& cell, int threads, Survey& survey) {
   survey.facts += "; " + std::to_string(n_beads) + " beads, " + brief(spacing_um) + " um apart";
   if (spacing_um > kWidestSpacing_um)
     survey.doubts.push_back("The beads are " + brief(spacing_um) + " um apart (limit " + brief(kWidestSpacing_um) +
-                            " um): single fibres will not be told apart. Use more beads, or two colours of them.");
+                            " um): single fibres will not be resolved. Use more beads, or two colours of them.");
 }
 
 /// Do both show the same beads, how far apart, and the same way up?
