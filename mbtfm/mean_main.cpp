@@ -98,11 +98,11 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   report.figures = figures_of(rows, means, p.symmetry, ratio, blur, size);
   files::write_figures(context.output("out", "mean.json"), report.figures);
   report.summary = "mean of " + counted(std::ssize(kept), "cells") + " at " + std::to_string(means.size()) +
-                   " nodes; blurred by " + brief(blur.fttc_um) + " µm (tractions) and " + brief(blur.registration_um) +
-                   " µm (registration)";
+                   " nodes; blurred by " + brief(blur.fttc_um) + " µm by the tractions' smoothing and " +
+                   brief(blur.registration_um) + " µm by registration";
   if (ratio)
-    report.summary += "; tips over the rest of the edge " + brief(ratio->ratio) + " (" + brief(ratio->low) + " to " +
-                      brief(ratio->high) + ")";
+    report.summary += "; tips pull " + brief(ratio->ratio) + " times (" + brief(ratio->low) + " to " +
+                      brief(ratio->high) + ") as hard as the rest of the edge";
   write_page(context, picture, files::read_text(registration_file), report);
   return report;
 }

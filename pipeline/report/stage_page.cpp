@@ -27,6 +27,7 @@ std::string shown(const std::string& text) {
   if (const auto truth = named<Truth>(text)) return *truth == Truth::yes ? "yes" : "no";
   if (!is_number(text) || text.find_first_of(".e") == text.npos) return text;
   const double value = std::stod(text);
+  if (std::abs(value) < 1e-12) return "0";  // but for rounding
   return std::abs(value) >= 100 ? fmt::format("{:.0f}", value) : fmt::format("{:#.3g}", value);
 }
 
@@ -88,9 +89,11 @@ std::string section_of(const Listing& listing) {
 }
 
 std::string section_of_picture(const std::string& title, const std::string& svg_file, const std::string& explained) {
-  return section(title, "<svg role=\"img\" aria-label=\"" + html_escaped(title + ". " + explained) +
-                            "\" style=\"max-width:100%;height:auto\"" + svg_file.substr(svg_file.find("<svg") + 4) +
-                            "<p class=\"sub\">" + html_escaped(explained) + "</p>\n");
+  return section(title, "<div class=\"scroll\"><svg role=\"img\" aria-label=\"" +
+                            html_escaped(title + ". " + explained) +
+                            "\" style=\"max-width:100%;min-width:34rem;height:auto\"" +
+                            svg_file.substr(svg_file.find("<svg") + 4) + "</div>\n<p class=\"sub\">" +
+                            html_escaped(explained) + "</p>\n");
 }
 
 std::string html_of(const StagePage& of) {
@@ -98,7 +101,7 @@ std::string html_of(const StagePage& of) {
   body += section_of_picture(of.picture_title, of.picture_svg, of.picture_explained);
   for (const Listing& listing : of.tables) body += section_of(listing);
   std::vector<std::pair<std::string, std::string>> pairs;
-  for (const auto& [name, value] : of.figures) pairs.emplace_back(name, text_of_figure(value));
+  for (const auto& [name, value] : of.figures) pairs.emplace_back(heading_of(name), text_of_figure(value));
   body += section("All figures", html_of_pairs("All figures", pairs));
   return html_of(Page{.title = of.title, .body = body});
 }

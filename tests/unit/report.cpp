@@ -60,7 +60,7 @@ TEST(StagePage, its_picture_has_a_name_and_keeps_to_the_page_and_its_tables_have
                         .figures = {{"n", std::int64_t(1)}}});
   EXPECT_TRUE(has_words(html,
                         "<svg role=\"img\" aria-label=\"Tension. Left: a &quot;map&quot;.\" "
-                        "style=\"max-width:100%;height:auto\" width=\"920\""));
+                        "style=\"max-width:100%;min-width:34rem;height:auto\" width=\"920\""));
   std::size_t n_tables = 0, n_captions = 0;
   for (std::size_t at = 0; (at = html.find("<table>", at)) != std::string::npos; ++at) ++n_tables;
   for (std::size_t at = 0; (at = html.find("<table><caption", at)) != std::string::npos; ++at) ++n_captions;
@@ -263,7 +263,7 @@ TEST(Report, shows_the_gravest_finding_first_and_prints_units_as_papers_do) {
   EXPECT_LT(html.find(bad.text), html.find(printed));
 }
 
-TEST(Report, tells_the_noise_from_the_models_error) {
+TEST(Report, separates_the_noise_from_the_models_error) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
   results.fit.relative_l2 = 0.5;
@@ -273,7 +273,7 @@ TEST(Report, tells_the_noise_from_the_models_error) {
   EXPECT_TRUE(has_words(text_of(results), "All that the model leaves"));
 }
 
-TEST(Report, names_no_part_of_the_network_that_beads_do_not_tell) {
+TEST(Report, names_no_part_of_the_network_that_beads_do_not_show) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
   results.tensions.at(0).identifiable = true;
