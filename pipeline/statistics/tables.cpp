@@ -155,20 +155,16 @@ Columns<StudyCell> figure_columns() {
           columns_of(&C::space, space_columns())};
 }
 
-std::string with_semicolons(const std::vector<int>& ids) {
-  std::string list;
-  for (const int id : ids) list += (list.empty() ? "" : ";") + std::to_string(id);
-  return list;
+std::string fibres_left_out(const CellRow& row) {
+  return row.cell ? fmt::format("{}", fmt::join(row.cell->review.fibres_left_out, ";")) : "";
 }
 
 Table<InCell<CellRow>> cell_table() {
   return {.file = "statistics/cells.csv",
-          .columns = in_cell<CellRow>(
-              {{"included", [](const CellRow& row) { return row.cell != nullptr; }},
-               {"reason", &CellRow::reason},
-               {"fibres_left_out",
-                [](const CellRow& row) { return row.cell ? with_semicolons(row.cell->review.fibres_left_out) : ""; }},
-               columns_of(&CellRow::cell, figure_columns())})};
+          .columns = in_cell<CellRow>({{"included", [](const CellRow& row) { return row.cell != nullptr; }},
+                                       {"reason", &CellRow::reason},
+                                       {"fibres_left_out", fibres_left_out},
+                                       columns_of(&CellRow::cell, figure_columns())})};
 }
 
 std::vector<InCell<CellRow>> cell_rows(const Study& study) {
@@ -346,7 +342,7 @@ std::vector<VarianceRow> variance_rows(const Analysis& analysis) {
   std::vector<VarianceRow> rows;
   for (const Measure& m : analysis.measures) {
     const auto add = [&](const std::string& component, const std::optional<double>& variance) {
-      const char* remark = m.model ? "too few values to tell it from the others" : m.obstacle.c_str();
+      const char* remark = m.model ? "too few values to separate it from the others" : m.obstacle.c_str();
       if (variance) remark = *variance > 0 ? "" : "no more than the errors explain";
       rows.push_back(
           {m.sample.column, component, variance ? std::optional(std::sqrt(*variance)) : std::nullopt, remark});

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 
 #include "pipeline/numerics/dense.h"
@@ -90,14 +89,13 @@ void SpotFit::paint(const Spot& spot, double share) {
   if (box.is_empty()) return;
   const Profiles p(spot.place, box, w);
   const int n = box.high[0] - box.low[0] + 1;
-  for (int k = box.low[2]; k <= box.high[2]; ++k) {
+  for (int k = box.low[2]; k <= box.high[2]; ++k)
     for (int j = box.low[1]; j <= box.high[1]; ++j) {
       const auto height =
           static_cast<float>(share * spot.height) * p.z.value[k - box.low[2]] * p.y.value[j - box.low[1]];
       float* row = volume_.row(j, k) + box.low[0];
       for (int i = 0; i < n; ++i) row[i] += height * p.x.value[i];
     }
-  }
 }
 
 void SpotFit::add(const std::vector<Spot>& spots) {
@@ -112,18 +110,16 @@ void SpotFit::add(const std::vector<Spot>& spots) {
 void SpotFit::find_neighbours() {
   touching_.assign(spots_.size(), {});
   if (spots_.empty()) return;
-  const auto stretched = [&](const Spot& spot) {
-    const Widths w = shape_.at(spot.place);
-    return Vec3{spot.place.x, spot.place.y, spot.place.z * w.xy / w.z};
-  };
   std::vector<Vec3> places;
-  for (const Spot& spot : spots_) places.push_back(stretched(spot));
+  for (const Spot& spot : spots_) {
+    const Widths w = shape_.at(spot.place);
+    places.push_back({spot.place.x, spot.place.y, spot.place.z * w.xy / w.z});
+  }
   const numerics::Near near(places, kTouching * shape_.at(spots_[0].place).xy);
   numerics::parallel_for_each(spots_.size(), threads_, [&](std::size_t s) {
     const double reach = kTouching * shape_.at(spots_[s].place).xy;
-    for (const int other : near.within(places[s], reach, kMostNeighbours + 1)) {
+    for (const int other : near.within(places[s], reach, kMostNeighbours + 1))
       if (static_cast<std::size_t>(other) != s) touching_[s].push_back(other);
-    }
     if (touching_[s].size() > kMostNeighbours) touching_[s].resize(kMostNeighbours);
   });
 }
@@ -145,9 +141,8 @@ SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
   std::vector<Profiles> profiles{{spot.place, box, w}};
   std::vector<double> heights{spot.height};
   for (const int other : touching_[number]) {
-    const Spot& o = spots_[other];
-    profiles.emplace_back(o.place, box, shape_.at(o.place));
-    heights.push_back(o.height);
+    profiles.emplace_back(spots_[other].place, box, shape_.at(spots_[other].place));
+    heights.push_back(spots_[other].height);
   }
   const Profiles weight(spot.place, box, {kWindow * w.xy, kWindow * w.z});
   const auto n_spots = static_cast<int>(profiles.size());
@@ -243,13 +238,7 @@ void SpotFit::improve(int rounds) {
 
 void SpotFit::drop(const std::vector<bool>& is_bad) {
   std::vector<Spot> kept;
-  for (std::size_t s = 0; s < spots_.size(); ++s) {
-    if (is_bad[s]) {
-      paint(spots_[s], 1);
-    } else {
-      kept.push_back(spots_[s]);
-    }
-  }
+  for (std::size_t s = 0; s < spots_.size(); ++s) is_bad[s] ? paint(spots_[s], 1) : kept.push_back(spots_[s]);
   spots_ = std::move(kept);
   find_neighbours();
 }
@@ -262,7 +251,7 @@ void SpotFit::drop_where(const std::function<bool(const Spot&)>& is_bad) {
 
 void SpotFit::drop_doubles(double share) {
   std::vector<bool> is_double(spots_.size());
-  for (std::size_t s = 0; s < spots_.size(); ++s) {
+  for (std::size_t s = 0; s < spots_.size(); ++s)
     for (const int other : touching_[s]) {
       const Spot& o = spots_[other];
       const bool is_dimmer =
@@ -270,7 +259,6 @@ void SpotFit::drop_doubles(double share) {
       const double apart = distance_in_widths(o.place, spots_[s].place, shape_.at(spots_[s].place));
       if (is_dimmer && apart < share) is_double[s] = true;
     }
-  }
   drop(is_double);
 }
 
@@ -320,10 +308,8 @@ void SpotFit::measure_shape() {
   // the brighter half of each depth, some thousand in all
   constexpr int kLayers = 8;
   std::vector<std::vector<int>> layers(kLayers);
-  for (const int s : lonely) {
-    const double z = spots_[s].place.z;
-    layers[std::clamp(static_cast<int>(kLayers * z / volume_.depth), 0, kLayers - 1)].push_back(s);
-  }
+  for (const int s : lonely)
+    layers[std::clamp(static_cast<int>(kLayers * spots_[s].place.z / volume_.depth), 0, kLayers - 1)].push_back(s);
   std::vector<int> chosen;
   constexpr std::size_t kMostOfLayer = 200;
   for (std::vector<int>& layer : layers) {
@@ -383,34 +369,31 @@ void SpotFit::measure_noise() {
       bins[bin].light += light;
     });
   }
-  // y = b x + c x² with weights 1/x²: relative errors are alike
-  double xx = 0, xxx = 0, xxxx = 0, xy = 0, xxy = 0;
+  // y / x = b + c x: the errors of y are alike relative to x
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
   for (Bin& bin : bins) {
     if (bin.squares.size() < 50) continue;
     const double x = bin.light / static_cast<double>(bin.squares.size());
     std::ranges::sort(bin.squares);
     bin.squares.resize(bin.squares.size() - bin.squares.size() / 50);  // what an unseen neighbour leaves
-    double y = 0;
-    for (const float value : bin.squares) y += value;
-    y /= static_cast<double>(bin.squares.size());
-    const double weight = static_cast<double>(bin.squares.size()) / (x * x);
-    xx += weight * x * x, xxx += weight * x * x * x, xxxx += weight * x * x * x * x;
-    xy += weight * x * y, xxy += weight * x * x * y;
+    const auto n = static_cast<double>(bin.squares.size());
+    const double y = std::accumulate(bin.squares.begin(), bin.squares.end(), 0.0) / n;
+    const Eigen::Vector2d row(1, x);
+    normal += n * row * row.transpose();
+    right += n * y / x * row;
   }
-  const double determinant = xx * xxxx - xxx * xxx;
-  if (!(determinant > 0)) return;
-  double b = (xy * xxxx - xxy * xxx) / determinant;
-  if ((xxy * xx - xy * xxx) / determinant < 0) b = xy / xx;  // no misfit at all
-  noise_.light_variance = std::max(0.0, b);
+  if (!(normal(0, 0) * normal(1, 1) > normal(0, 1) * normal(1, 0))) return;
+  const Eigen::Vector2d line = numerics::solve_symmetric(normal, right);
+  noise_.light_variance = std::max(0.0, line[1] < 0 ? right[0] / normal(0, 0) : line[0]);  // below 0: no misfit
 }
 
 void SpotFit::measure_errors() {
   std::vector<Step> steps(spots_.size());
   numerics::parallel_for_each(spots_.size(), threads_,
                               [&](std::size_t s) { steps[s] = step_of(static_cast<int>(s), true); });
-  for (std::size_t s = 0; s < spots_.size(); ++s) {
+  for (std::size_t s = 0; s < spots_.size(); ++s)
     if (steps[s].is_sound) spots_[s] = steps[s].spot;
-  }
   drop_where([](const Spot& spot) { return !(spot.sigma > 0 && spot.sigma_z > 0); });
 }
 
