@@ -88,9 +88,8 @@ void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const st
     }
   }
   for (std::size_t i = 0; i < deviations.size(); ++i) {
-    double sum = 0;
-    for (const double d : deviations[i]) sum += d * d;
-    all.tensions.nN[i].standard_error = std::sqrt(sum / parameters.bootstrap);
+    const Eigen::Map<const VectorXd> drawn(deviations[i].data(), std::ssize(deviations[i]));
+    all.tensions.nN[i].standard_error = std::sqrt(drawn.squaredNorm() / parameters.bootstrap);
     all.tensions.nN[i].sides_95 = percentiles_95(deviations[i]);
   }
 }
@@ -299,9 +298,8 @@ void add_force_estimates(EnsembleFit& all, bool is_cut) {
 void add_estimates(EnsembleFit& all, bool is_cut) {
   const auto n_tensions = static_cast<Index>(all.tensions.fibre_ids.size());
   all.tensions.covariance_nN2 = MatrixXd::Zero(n_tensions, n_tensions);
-  for (const MeshFit& mesh : all.meshes) {
+  for (const MeshFit& mesh : all.meshes)
     all.tensions.covariance_nN2 += mesh.covariance_nN2 / static_cast<double>(all.meshes.size());
-  }
   for (Index i = 0; i < n_tensions; ++i) {
     all.tensions.nN.push_back(sum_of(all, {static_cast<int>(i)}));
     all.tensions.nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
@@ -358,8 +356,7 @@ FirstFit fit_first(const network::Contractile& network, LinearData data, const s
 
 /// What each mesh makes of the mean tensions, by its derivatives about its own.
 std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
-  VectorXd mean_nN = VectorXd::Zero(static_cast<Index>(all.tensions.fibre_ids.size()));
-  for (const MeshFit& mesh : all.meshes) mean_nN += mesh.fit.trial.tensions_nN / static_cast<double>(all.meshes.size());
+  const VectorXd mean_nN = sum_over_meshes_nN(all) / static_cast<double>(all.meshes.size());
   std::vector<MeshForces> forces;
   for (const MeshFit& mesh : all.meshes) {
     const Trial& trial = mesh.fit.trial;
@@ -391,12 +388,9 @@ Trial next_start(const EnsembleFit& fit) {
 }
 
 VectorXd directions_of(const VectorXd& forces_nN, Index dimension) {
-  VectorXd along = VectorXd::Zero(forces_nN.size());
-  for (Index row = 0; row < forces_nN.size(); row += dimension) {
-    const auto force = forces_nN.segment(row, dimension);
-    const double size = force.norm();
-    if (size > 0) along.segment(row, dimension) = force / size;
-  }
+  VectorXd along(forces_nN.size());
+  for (Index row = 0; row < forces_nN.size(); row += dimension)
+    along.segment(row, dimension) = forces_nN.segment(row, dimension).normalized();  // none has no direction
   return along;
 }
 
@@ -477,6 +471,13 @@ void add_leverage_weighted(EnsembleFit& all) {
     all.misfit.variance = std::max(all.misfit.variance, all.misfit.leverage_weighted_variance);
 }
 
+/// A robust loss discounts the beads beside adhesions where the network is wrong, and with them what the misfit shows.
+LinearData data_for_model_error(const EnsembleFit& all) {
+  const MeshFit& mesh = all.meshes.front();
+  if (all.misfit.loss == Loss::squares) return all.data;
+  return without_strays(unweighted(all.data), mesh.fit.trial, mesh.force_derivatives);
+}
+
 /// What adhesions exert in addition to the network, near a cut and where the network is wrong.
 /// @param is_whole  all that the cell pulls at is among them: they balance
 Discrepancy add_discrepancy(EnsembleFit& all, const ModelError& error, bool is_whole) {
@@ -494,9 +495,8 @@ void add_variances(EnsembleFit& all, bool is_cut) {
                                       static_cast<double>(std::max<Index>(1, all.data.n_used - n_tensions));
   all.misfit.variance = misfit_variance(all.data, all.forces.nN, n_tensions, all.misfit.loss);
   if (all.meshes.size() < 2) return;
-  const std::vector<MeshForces> meshes = forces_at_mean(all);
-  all.model_error = model_error(meshes, all.data.reduced,
-                                variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss));
+  const double variance = variance_beside_model_error(all.data, all.forces.nN, n_tensions, all.misfit.loss);
+  all.model_error = model_error(forces_at_mean(all), data_for_model_error(all).reduced, variance);
   all.misfit.variance = all.model_error->noise_variance;
   if (!all.model_error->is_known) return;
   const Discrepancy beside = add_discrepancy(all, *all.model_error, !is_cut);

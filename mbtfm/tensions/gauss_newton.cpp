@@ -16,9 +16,8 @@ namespace {
 
 std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
   std::vector<int> indices;
-  for (std::size_t i = 0; i < is_held.size(); ++i) {
+  for (std::size_t i = 0; i < is_held.size(); ++i)
     if (is_held[i] == wanted) indices.push_back(static_cast<int>(i));
-  }
   return indices;
 }
 
@@ -188,9 +187,8 @@ Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
   const double whole = 2 * minimum.objective + problem.data().floor_squared;
   const double variance = whole / static_cast<double>(std::max<Index>(1, problem.data().n_components));
   return [jacobian = problem.jacobian(minimum), at = minimum.tensions_nN, variance](const Trial& trial) {
-    for (Index i = 1; i < at.size(); ++i) {
+    for (Index i = 1; i < at.size(); ++i)
       if (is_slack(trial.tensions_nN, i) != is_slack(at, i)) return false;
-    }
     return numerics::matvec(jacobian, trial.tensions_nN - at).squaredNorm() < variance;
   };
 }
@@ -198,15 +196,13 @@ Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
 /// Tensions that came out slack, set to the median of the others; none where there are none.
 std::optional<VectorXd> slack_ones_raised(const VectorXd& tensions_nN) {
   std::vector<double> taut;
-  for (Index i = 1; i < tensions_nN.size(); ++i) {
+  for (Index i = 1; i < tensions_nN.size(); ++i)
     if (!is_slack(tensions_nN, i)) taut.push_back(tensions_nN[i]);
-  }
   if (taut.empty() || taut.size() + 1 == static_cast<std::size_t>(tensions_nN.size())) return std::nullopt;
   const double middle = numerics::median_in(taut);
   VectorXd raised = tensions_nN;
-  for (Index i = 1; i < raised.size(); ++i) {
+  for (Index i = 1; i < raised.size(); ++i)
     if (is_slack(tensions_nN, i)) raised[i] = middle;
-  }
   return raised;
 }
 

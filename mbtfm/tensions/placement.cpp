@@ -99,17 +99,6 @@ std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
   return with_error(shift_um, {sigma[0], sigma[1]}) + " um";
 }
 
-/// A stray bead near an adhesion, where the field is steep, moves a cell by several of its errors.
-/// @param motions  by the placement, which follow such a bead as the tensions do
-LinearData without_strays(LinearData data, const Trial& trial, const MatrixXd& derivatives, const MatrixXd& motions) {
-  const std::vector<Index> strays =
-      stray_beads(data, studentized(with_more_motions(data, motions), trial, derivatives));
-  if (strays.empty()) return data;
-  VectorXd weight = VectorXd::Ones(data.weight_per_um.size() / 2);
-  for (const Index bead : strays) weight[bead] = 0;
-  return reweighted(std::move(data), weight);
-}
-
 /// The step after one that missed: a step goes by J of what is left, J = 1 but for Broyden's first update with what
 /// came of the one before. All in standard errors, which are alike for shifts and turn.
 /// @param planned, went  the step before, as it was to be and as it was taken
@@ -261,6 +250,7 @@ PlacedCell place_cell(const Cell& cell, const network::Contractile& network, con
     const MatrixXd motions =
         placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
     const MatrixXd derivatives = problem.force_derivatives(fit.trial);
+    // A stray bead near an adhesion, where the field is steep, moves a cell by several of its errors.
     if (parameters.loss != Loss::squares) there = without_strays(std::move(there), fit.trial, derivatives, motions);
     const Step step = step_of(there, fit.trial, derivatives, motions);
     const double length_um = way_um(step.value, lever_um), sigma_um = std::max(step.sigma[0], step.sigma[1]);

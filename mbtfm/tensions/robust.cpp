@@ -17,9 +17,8 @@ namespace {
 std::vector<double> used_lengths(const LinearData& data, const VectorXd& residual) {
   std::vector<double> lengths;
   const Index each = data.dimension;
-  for (Index i = 0; i < residual.size(); i += each) {
+  for (Index i = 0; i < residual.size(); i += each)
     if (data.weight_per_um[i] > 0) lengths.push_back(residual.segment(i, each).norm());
-  }
   return lengths;
 }
 
@@ -221,6 +220,16 @@ std::vector<Index> stray_beads(const LinearData& data, const Studentized& beads)
     if (stands_alone(data, residual, each * b)) strays.push_back(b);
   }
   return 2 * strays.size() > n_large ? strays : std::vector<Index>();
+}
+
+LinearData without_strays(LinearData data, const Trial& trial, const MatrixXd& force_derivatives,
+                          const MatrixXd& motions) {
+  const LinearData& followed = motions.size() > 0 ? with_more_motions(data, motions) : data;
+  const std::vector<Index> strays = stray_beads(data, studentized(followed, trial, force_derivatives));
+  if (strays.empty()) return data;
+  VectorXd weight = VectorXd::Ones(data.bead_weight.size());
+  for (const Index bead : strays) weight[bead] = 0;
+  return reweighted(std::move(data), weight);
 }
 
 double harm_done_by(const std::vector<Index>& strays, const LinearData& data, const VectorXd& weighted_residual,

@@ -30,6 +30,11 @@ Studentized studentized(const LinearData& data, const Trial& trial, const Matrix
 /// gel only.
 std::vector<Index> stray_beads(const LinearData& data, const Studentized& beads);
 
+/// All beads in full but the strays of this trial, which are left out.
+/// @param motions  that follow a bead as the tensions do, in addition to the data's; empty: none
+LinearData without_strays(LinearData data, const Trial& trial, const MatrixXd& force_derivatives,
+                          const MatrixXd& motions = {});
+
 /// What these beads do to the fit by least squares, in standard errors: by how many the tension moves most that does if
 /// they lose all their weight (the forces taken as linear in the tensions), or by what share they widen all of them,
 /// the larger. One of two hundred thousand beads moves none; but one that is micrometres off widens them from anywhere.

@@ -61,8 +61,7 @@ TEST(ModelError, gives_the_errors_of_the_tensions_from_two_meshes_as_from_eight)
       const ReducedData data = model.data(2);
       const std::vector<MeshForces> meshes = model.meshes(n_meshes);
       const ModelError error = model_error(meshes, data, 1);
-      Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(Model::kForces);
-      for (const MeshForces& mesh : meshes) mean_nN += mesh.forces_nN / n_meshes;
+      const Eigen::VectorXd mean_nN = mean_of(meshes).forces_nN;
       const Eigen::MatrixXd J = *data.compliance * model.D;
       const Eigen::MatrixXd K = (J.transpose() * J).inverse(), by_slope = J.transpose() * *data.compliance;
       LocalMisfit local{.tensions_nN = model.tensions, .H = J.transpose() * J, .g = Eigen::VectorXd::Zero(4)};
@@ -99,8 +98,7 @@ TEST(ModelError, is_at_least_how_far_one_more_mesh_lies_from_the_mean_of_these) 
     for (unsigned seed = 1; seed <= kDraws; ++seed) {
       Model model(seed);
       const std::vector<MeshForces> meshes = model.meshes(n_meshes);
-      Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(Model::kForces);
-      for (const MeshForces& mesh : meshes) mean_nN += mesh.forces_nN / n_meshes;
+      const Eigen::VectorXd mean_nN = mean_of(meshes).forces_nN;
       const ModelError error = model_error(meshes, model.data(0), 1);
       stated += error.least_phi_nN / error.phi_nN * error.force_variance_nN2.sum();
       observed += (model.forces(1) - mean_nN).squaredNorm();
@@ -292,9 +290,9 @@ Cell cell_with_arcs() {
 }
 
 /// Mean square of error over stated error, of the fibres of four cells that pull by networks of their own, fitted on
-/// others; and the same were the beads' noise the only error.
+/// others; the same were the beads' noise the only error; and phi by a robust loss over that by least squares.
 struct OverStated {
-  double all = 0, noise_alone = 0;
+  double all = 0, noise_alone = 0, phi_by_robust_loss = 0;
 };
 OverStated errors_over_stated(mesh::LinkReach reach_of_truth, int n_meshes) {
   OverStated squares;
@@ -313,6 +311,10 @@ OverStated errors_over_stated(mesh::LinkReach reach_of_truth, int n_meshes) {
       networks.emplace_back(mesh::generate_network(cell, {.seed = 100 * seed + static_cast<unsigned>(m)}).network);
     const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2);
     EXPECT_TRUE(fit.report.converged) << fit.report.reason;
+    const auto phi_by = [&](Loss loss) {
+      return fit_ensemble(networks, scene.data, scene.adhesion_ids, {.loss = loss}, 2).model_error->measured_phi_nN;
+    };
+    if (n_meshes == 2) squares.phi_by_robust_loss += phi_by(Loss::huber) / phi_by(Loss::squares) / 4;
     for (std::size_t i = 1; i < 6; ++i) {
       const double error = fit.tensions.nN[i].value - tensions[static_cast<Eigen::Index>(i)];
       squares.all += std::pow(error / fit.tensions.nN[i].standard_error, 2) / 20;
@@ -330,6 +332,8 @@ TEST(ModelError, is_what_the_tensions_of_a_cell_with_another_network_are_off_by)
       EXPECT_LT(squares.all, 2.0) << name_of(reach) << ", " << n_meshes << " meshes";
       EXPECT_GT(squares.all, 0.2) << name_of(reach) << ", " << n_meshes << " meshes";
       EXPECT_GT(squares.noise_alone, 4) << "the noise alone must not explain it for this to tell anything";
+      // no bead is a stray, but beads beside adhesions look like some, and a few are taken for them
+      if (n_meshes == 2) EXPECT_NEAR(squares.phi_by_robust_loss, 1, 0.2) << name_of(reach);
     }
 }
 
@@ -338,14 +342,10 @@ TEST(ModelError, what_the_beads_show_of_a_tension_adds_up_to_their_part_of_its_e
   for (int i = 1; i <= 3; ++i) test::add_ventral(cell, i, i + 6);
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 2, 5, 4), 800, 0.05, 3);
   std::vector<cables::CableNetwork> networks;
-  for (std::uint64_t seed = 11; seed <= 14; ++seed) {
-    mesh::NetworkParameters p;
-    p.seed = seed;
-    networks.emplace_back(mesh::generate_network(cell, p).network);
-  }
-  FitParameters parameters;
-  parameters.n_meshes = 4;
-  parameters.loss = Loss::squares;  // with one that weighs beads down their noise counts for less than it is
+  for (std::uint64_t seed = 11; seed <= 14; ++seed)
+    networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
+  // with a loss that weighs beads down their noise counts for less than it is
+  const FitParameters parameters{.loss = Loss::squares, .n_meshes = 4};
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2);
   ASSERT_TRUE(fit.model_error.has_value());
   const Influence influence = influence_of(fit, fit.data);
