@@ -191,7 +191,7 @@ DrawnField drawn_field(double side, const std::vector<test::Peak>& peaks, const 
 }
 
 TEST(FarField, turn_growth_and_shear_beside_a_cell_are_found_within_their_errors) {
-  constexpr double kSide = 600, kNoise = 0.3;
+  constexpr double kSide = 600;
   constexpr int kDraws = 12;
   const auto peaks = test::ring_of_adhesions(kSide, 8);
   const AffineMotion truth{.shift = {3, -2},
@@ -202,7 +202,8 @@ TEST(FarField, turn_growth_and_shear_beside_a_cell_are_found_within_their_errors
                            .centre = {0.5 * (kSide - 1), 0.5 * (kSide - 1)}};
   double squares = 0, n = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    const DrawnField field = drawn_field(kSide, peaks, truth, kNoise, 1 + draw);
+    const double noise = draw % 2 == 0 ? 0.3 : 0.02;  // what a bead adds, what the tail's unknown law does
+    const DrawnField field = drawn_field(kSide, peaks, truth, noise, 1 + draw);
     const FarField far = whole_motion(field.positions, field.displacements, {-0.5, -0.5}, kSide, kSide).affine;
     ASSERT_TRUE(far.is_at_rest);
     for (const auto& [found, wanted, sigma] : {std::array{far.drift.shift.x, truth.shift.x, far.errors.shift},

@@ -225,7 +225,7 @@ TEST_F(Segment, images_that_are_shifted_or_exchanged_and_actin_that_is_no_fibre_
   images::Image bled = adhesion;
   for (std::size_t k = 0; k < bled.pixels.size(); ++k) bled.pixels[k] += 0.3f * actin.pixels[k];
   const std::string through = found(bled, actin);
-  EXPECT_TRUE(fires("bleed-through", through)) << through;
+  EXPECT_TRUE(fires("bleed-through", "shows the fibres with", through)) << through;
   // a ring as of a podosome rosette: a line for the eye, too bent for a fibre
   images::Image with_ring = actin;
   const float bright = *std::ranges::max_element(actin.pixels);

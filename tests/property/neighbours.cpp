@@ -1,4 +1,5 @@
 /// Cells that pull at the gel beside the one that is fitted, in the picture and beyond its border.
+#include "mbtfm/fit/ready_cell.h"
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
@@ -33,13 +34,11 @@ struct Scene {
     beads = experiment.measured;
   }
   LinearData data() const {
-    std::vector<bool> is_used;
-    for (const Bead& bead : beads) is_used.push_back(!is_nearer_to_neighbour(experiment.cell, bead.position_um));
     return reduce(beads,
                   greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)
                       ->response({substrate::ellipses_of(experiment.cell.adhesions)}, {points_of(beads)})
                       ->kept(),
-                  is_used, 2, affine_motions(beads));
+                  fit::beads_in_region(beads, experiment.cell, {}), 2, affine_motions(beads));
   }
 };
 
