@@ -11,9 +11,9 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105400;
+constexpr int kLinesOfProduct = 105384;
 constexpr int kLinesOfTests = 45622;
-constexpr int kLongSources = 11;                                                  // .cpp of the product above 400 lines
+constexpr int kLongSources = 9;                                                   // .cpp of the product above 400 lines
 constexpr int kLongestSource = 570;                                               // lines
 constexpr int kOwnHeadersMedian = 17, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
 constexpr int kSeeFindings = 35;  // sources of product and tests that a new kind of finding compiles again
