@@ -283,10 +283,8 @@ std::string Chart::on_page() const {
 
 std::string Chart::str() const {
   const double left_px = this->left_px();
-  const bool is_above_all = !subtitle_.empty() || second_factor_ > 0;
-  const double title_px = is_above_all ? 18 : kTop_px - (key_side_ == KeySide::above ? 32 : 12);
   std::string svg =
-      fmt::format("<text x=\"{}\" y=\"{}\" font-weight=\"600\">{}</text>\n", left_px, title_px, html_escaped(title_)) +
+      fmt::format("<text x=\"{}\" y=\"18\" font-weight=\"600\">{}</text>\n", left_px, html_escaped(title_)) +
       fmt::format("<text x=\"{}\" y=\"37\" fill=\"{}\">{}</text>\n", left_px, subtitle_colour_,
                   html_escaped(subtitle_)) +
       frame_svg();
