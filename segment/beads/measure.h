@@ -63,6 +63,12 @@ std::vector<std::optional<int>> matched_spots(const Scene& scene, const std::vec
 /// Kaiser, Squires & Broadhurst, ApJ 449:460, 1995).
 BeadSizes sizes_of(const Scene& scene, const std::vector<Track>& tracks);
 
+/// A bead that moved in the pictures, by the cell or the stage, is looked for at its place in the other picture, beside
+/// itself: in a fit of two spots, less what the same fit finds in the other picture, where neighbours and the lens add
+/// the same. The median of many, by their information.
+/// @param turn  by which the stressed image was turned back
+Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const std::optional<Turn>& turn);
+
 struct Pooled {
   Vec2 u;               ///< px
   double sigma_px = 0;  ///< standard error of a component

@@ -19,6 +19,7 @@ struct Turn {
   double angle_rad = 0;  ///< from +x towards +y
   Vec2 shift, centre;
   Vec2 of(Vec2 place) const { return centre + shift + rotated(place - centre, angle_rad); }
+  Vec2 back(Vec2 place) const { return centre + rotated(place - centre - shift, -angle_rad); }
 };
 
 /// From the relaxed picture to another one in which the gel is at rest; px. By default both are the same.

@@ -128,6 +128,8 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with, stage::Stag
                       (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
   }
   notice_images(tracking, context);
+  if (const Ghosts& g = tracking.ghosts; g.share > 5 * g.sigma)
+    context.notice(noticed(Symptom::ghost_beads, g.share, {.at = g.is_relaxed ? "relaxed" : "stressed"}));
   context.notice(noticed(Symptom::beads_wide, diameter_in_focus_um(tracking.bead_sigma_um, pixel_size_um)));
   if (tracking.period_um > 0) {
     const double farthest_um = std::max(norm(shift_um), figures_of(tracking.field).largest_um);
@@ -151,7 +153,9 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with, stage::Stag
                         {"bead_size_ratio", tracking.sizes.ratio},
                         {"bead_size_ratio_sigma", tracking.sizes.sigma},
                         {"bead_elongation", tracking.sizes.elongation},
-                        {"bead_elongation_sigma", tracking.sizes.elongation_sigma}};
+                        {"bead_elongation_sigma", tracking.sizes.elongation_sigma},
+                        {"ghost_share", tracking.ghosts.share},
+                        {"ghost_share_sigma", tracking.ghosts.sigma}};
   report.figures.insert(report.figures.end(), more.begin(), more.end());
   add_figures(report, tracking.common);
   report.effects = {tracking.affine, tracking.windows};

@@ -137,6 +137,13 @@ struct BeadSizes {
   bool is_of_pixels = false;
 };
 
+/// How much of one picture's light shines in the other one, as where a camera keeps an image or frames were averaged.
+struct Ghosts {
+  double share = 0;        ///< of a bead's height; the larger of both pictures'
+  double sigma = 0;        ///< its standard error; 0: not known
+  bool is_relaxed = true;  ///< the picture that shows the other's beads, too
+};
+
 struct Tracking {
   DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
   Placement stressed;           ///< of the relaxed picture in the stressed one, if the gel were at rest
@@ -146,6 +153,7 @@ struct Tracking {
   double bead_sigma_um = 0;     ///< of a bead's picture
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   BeadSizes sizes{};
+  Ghosts ghosts{};
   int n_good = 0;
   Effect affine{};              ///< whether turn, growth and shear were taken off, and why
   Effect windows{};             ///< whether windows were followed in place of single beads, and why

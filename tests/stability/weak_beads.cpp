@@ -147,6 +147,28 @@ TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
     }
 }
 
+TEST(Ghosts, of_a_mixed_picture_have_the_share_that_was_mixed_and_sound_pictures_have_none) {
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  for (const double drift : {0.0, 3.0}) {
+    for (const float share : {0.0f, 0.2f}) {
+      for (const bool is_relaxed : {true, false}) {
+        SCOPED_TRACE(testing::Message() << drift << " px, " << share << (is_relaxed ? " relaxed" : " stressed"));
+        auto pair = test::draw_bead_pair(
+            peaks, {.width = 384, .n_beads = 1500, .bead_aspect = 1.2, .drift = {drift, 0}, .seed = 4});
+        images::Image& mixed = is_relaxed ? pair.relaxed : pair.stressed;
+        const images::Image& other = is_relaxed ? pair.stressed : pair.relaxed;
+        for (std::size_t k = 0; k < mixed.pixels.size(); ++k)
+          mixed.pixels[k] = (1 - share) * mixed.pixels[k] + share * other.pixels[k];
+        const Ghosts found = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2).ghosts;
+        // a ghost that touches its bead shortens the step between both by its share, so that it reads larger
+        EXPECT_NEAR(found.share, share, 0.02 + share * share + 4 * found.sigma);
+        EXPECT_LT(found.sigma, 0.02);
+        if (share > 0) EXPECT_EQ(found.is_relaxed, is_relaxed);
+      }
+    }
+  }
+}
+
 TEST(Focus, beads_that_are_not_round_are_measured) {
   const auto peaks = test::ring_of_adhesions(384, 6);
   for (const double aspect : {1 / 1.2, 1 / 1.1, 1.1, 1.2}) {

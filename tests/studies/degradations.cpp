@@ -352,6 +352,8 @@ std::vector<Degradation> degradations() {
          add_noise(s.relaxed, 3, 1);
          add_noise(s.stressed, 3, 2);
        }},
+      {"mixed", "the relaxed bead image shows a third of the stressed one's light, too", "pictures-mixed",
+       [](Set& s, const Set&) { put(s.relaxed, (2 * mat(s.relaxed) + mat(s.stressed)) / 3); }},
       {"adhesions-saturated", "the brightest 1 % of the adhesion image are saturated", "saturated",
        [](Set& s, const Set&) { saturate(s.adhesion, .01); }},
       {"actin-saturated", "the brightest 2 % of the actin image are saturated", "saturated",

@@ -495,7 +495,7 @@ TEST(GivenTable, what_many_rows_share_to_the_last_digit_is_a_mask_and_no_noise) 
       EXPECT_EQ(n_masked(given), masked.size());
       for (const std::size_t k : masked) EXPECT_EQ(given.field[k].flag, "masked");
       ASSERT_EQ(given.findings.size(), 1u);
-      EXPECT_EQ(given.findings[0].id, "vectors-masked");
+      EXPECT_EQ(given.findings[0].id, "input-not-used");
       EXPECT_NEAR(given.findings[0].number.value_or(0),
                   static_cast<double>(masked.size()) / static_cast<double>(field.size()), 1e-12);
       EXPECT_NEAR(given.field[0].sigma_um, kNoise_um, 0.2 * kNoise_um);
