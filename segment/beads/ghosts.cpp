@@ -16,9 +16,11 @@ struct Pair {
 
 /// Least squares over the pixels near both places, by a constant, the spot, its slopes, its change with its width, and
 /// the ghost, all Gaussians: linear in the light, so that noise has no bias.
-std::optional<Pair> fitted_pair(const Plane& plane, Vec2 place, Vec2 step, double sigma) {
+/// @param sigma  px, of the spot
+std::optional<Pair> fitted_pair(const Plane& plane, Vec2 place, Vec2 step, double sigma, double sigma_of_ghost) {
   constexpr double kReach = 2.5;  // sigmas
-  const double reach = kReach * sigma, per_variance = 1 / (sigma * sigma);
+  const double reach = kReach * std::max(sigma, sigma_of_ghost);
+  const double per_variance = 1 / (sigma * sigma), per_ghosts = 1 / (sigma_of_ghost * sigma_of_ghost);
   const int left = static_cast<int>(std::ceil(place.x + std::min(0.0, step.x) - reach));
   const int right = static_cast<int>(std::floor(place.x + std::max(0.0, step.x) + reach));
   const int top = static_cast<int>(std::ceil(place.y + std::min(0.0, step.y) - reach));
@@ -29,7 +31,7 @@ std::optional<Pair> fitted_pair(const Plane& plane, Vec2 place, Vec2 step, doubl
   for (int j = top; j <= bottom; ++j) {
     for (int i = left; i <= right; ++i) {
       const Vec2 d{i - place.x, j - place.y}, from_ghost = d - step;
-      const double squared = per_variance * dot(d, d), of_ghost = per_variance * dot(from_ghost, from_ghost);
+      const double squared = per_variance * dot(d, d), of_ghost = per_ghosts * dot(from_ghost, from_ghost);
       if (std::min(squared, of_ghost) > kReach * kReach) continue;
       const double spot = std::exp(-0.5 * squared);
       const cv::Vec<double, 6> row(1, spot, spot * d.x, spot * d.y, spot * squared, std::exp(-0.5 * of_ghost));
@@ -64,9 +66,10 @@ Ghosts median_share(std::vector<std::pair<double, double>> shares, bool is_relax
 
 }  // namespace
 
-Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const std::optional<Turn>& turn) {
+Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const BeadSizes& sizes,
+                 const std::optional<Turn>& turn) {
   constexpr double kNear = 0.5;  // bead sigmas: within it a bead and its ghost are one
-  const double sigma = scene.bead_sigma();
+  const double of_relaxed_px = scene.bead_sigma(), of_stressed_px = sizes.ratio * of_relaxed_px;
   const Plane &relaxed = scene.relaxed->image.plane, &stressed = scene.stressed.image.plane;
   const auto in = [&](bool is_relaxed) {
     std::vector<std::pair<double, double>> shares;
@@ -74,9 +77,10 @@ Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const std
       if (!tracks[k].is_good()) continue;
       const Vec2 from = scene.position(k), to = from + tracks[k].found.motion.u;
       const Vec2 step = is_relaxed ? (turn ? turn->of(to) : to) - from : (turn ? turn->back(from) : from) - to;
-      if (norm(step) < kNear * sigma) continue;
-      const auto own = fitted_pair(is_relaxed ? relaxed : stressed, is_relaxed ? from : to, step, sigma);
-      const auto other = fitted_pair(is_relaxed ? stressed : relaxed, is_relaxed ? to : from, step, sigma);
+      if (norm(step) < kNear * of_relaxed_px) continue;
+      const auto at_rest = fitted_pair(relaxed, from, step, of_relaxed_px, of_stressed_px);
+      const auto pulled = fitted_pair(stressed, to, step, of_stressed_px, of_relaxed_px);
+      const auto &own = is_relaxed ? at_rest : pulled, &other = is_relaxed ? pulled : at_rest;
       if (!own || !other || !(own->height > 0) || !(other->height > 0)) continue;
       const double height = own->height + std::max(0.0, own->ghost);
       shares.emplace_back((own->ghost - other->ghost) / height, height * height * own->information);

@@ -67,7 +67,8 @@ BeadSizes sizes_of(const Scene& scene, const std::vector<Track>& tracks);
 /// itself: in a fit of two spots, less what the same fit finds in the other picture, where neighbours and the lens add
 /// the same. The median of many, by their information.
 /// @param turn  by which the stressed image was turned back
-Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const std::optional<Turn>& turn);
+Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const BeadSizes& sizes,
+                 const std::optional<Turn>& turn);
 
 struct Pooled {
   Vec2 u;               ///< px

@@ -261,7 +261,7 @@ Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const Stress
   const Placement own{all.motion, turn}, cell = placement_of_cell(parameters_, stressed.cell, own);
   flag_out_of_sight(*measured.scene, own, measured.tracks);
   Tracking result = tracking_of(measured, all, own, cell, pixel_size_um);
-  if (by_beads) result.ghosts = ghosts_of(*measured.scene, measured.tracks, turn);
+  if (by_beads) result.ghosts = ghosts_of(*measured.scene, measured.tracks, measured.sizes, turn);
   if (by_beads && parameters_.method == TrackMethod::automatic && !parameters_.is_series) {
     const Gaps gaps(*measured.scene, measured.tracks);
     result.share_of_gaps = gaps.share();
