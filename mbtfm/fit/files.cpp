@@ -201,7 +201,7 @@ std::string summary_line(const FittedCell& cell) {
                      brief(cell.found.summary.total_force_nN) + " nN, relative L2 " +
                      brief(cell.found.summary.relative_l2) + of_series(cell.frames);
   const std::vector<std::string> together = names_of_groups(cell.fit);
-  if (!together.empty()) line += "; not known singly, but as a sum: fibres " + listed(together);
+  if (!together.empty()) line += "; resolved only as a sum: fibres " + listed(together);
   const auto n_unidentifiable = std::ranges::count(tensions, false, &Tension::identifiable);
   if (n_unidentifiable > 0)
     line += "; " + std::to_string(n_unidentifiable) + (n_unidentifiable == 1 ? " tension" : " tensions") +
