@@ -341,9 +341,11 @@ std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest
   std::vector<Trace> traces;
   for (const Candidate& c : fibres) traces.push_back(c.trace);
   traces = with_own_courses(std::move(traces), judge.ridges, judge.rule);
+  const Judge hidden{rest.field, rest.ridges, judge.rule, judge.outline_um, judge.texture, judge.p};
   std::vector<Candidate> result;
   const auto keep = [&](const Trace& trace) {
     auto c = judge.candidate(trace, 0);
+    if (!c) c = hidden.candidate(trace, 0);  // beside a brighter line it falls on one side only
     if (c) result.push_back(std::move(*c));
     return c.has_value();
   };
