@@ -363,7 +363,7 @@ void look_beyond(std::vector<Candidate>& fibres, const Rest& rest, const TraceRu
     std::ranges::transform(c.points_um, smooth.back().points.begin(),
                            [&](Vec2 u) { return to_pixels(u - rest.field.origin_um, rest.field.pixel_um); });
   }
-  const std::vector<double> goes_on = chances_of_going_on(smooth, rule);
+  const std::vector<double> goes_on = chances_of_going_on(smooth, rest.ridges, rule);
   for (std::size_t e = 0; e < goes_on.size(); ++e) {
     const bool is_first = e % 2 == 0;
     WayOn& way = is_first ? fibres[e / 2].before : fibres[e / 2].after;
