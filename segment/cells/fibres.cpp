@@ -341,9 +341,11 @@ std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest
   std::vector<Trace> traces;
   for (const Candidate& c : fibres) traces.push_back(c.trace);
   traces = with_own_courses(std::move(traces), judge.ridges, judge.rule);
+  const Judge hidden{rest.field, rest.ridges, judge.rule, judge.outline_um, judge.texture, judge.p};
   std::vector<Candidate> result;
   const auto keep = [&](const Trace& trace) {
     auto c = judge.candidate(trace, 0);
+    if (!c) c = hidden.candidate(trace, 0);  // beside a brighter line it falls on one side only
     if (c) result.push_back(std::move(*c));
     return c.has_value();
   };
@@ -361,7 +363,7 @@ void look_beyond(std::vector<Candidate>& fibres, const Rest& rest, const TraceRu
     std::ranges::transform(c.points_um, smooth.back().points.begin(),
                            [&](Vec2 u) { return to_pixels(u - rest.field.origin_um, rest.field.pixel_um); });
   }
-  const std::vector<double> goes_on = chances_of_going_on(smooth, rule);
+  const std::vector<double> goes_on = chances_of_going_on(smooth, rest.ridges, rule);
   for (std::size_t e = 0; e < goes_on.size(); ++e) {
     const bool is_first = e % 2 == 0;
     WayOn& way = is_first ? fibres[e / 2].before : fibres[e / 2].after;

@@ -120,50 +120,27 @@ std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridge
   return sum;
 }
 
-double over_noise_at(const Ridges& ridges, cv::Point2d p, double angle_rad) {
-  return ridges.at(p, angle_rad) / std::max<double>(sample(ridges.noise, p), 1e-30);
-}
-
 /// By how much the way over a gap is brighter than texture, in standard deviations.
 double over_noise_between(const Parabola& way, const Ridges& ridges) {
   double sum = 0;
   int n = 0;
-  for (double s = way.from; s <= way.to; ++s, ++n) sum += over_noise_at(ridges, way.at(s), way.angle_rad(s));
+  for (double s = way.from; s <= way.to; ++s, ++n)
+    sum += ridges.at(way.at(s), way.angle_rad(s)) / std::max<double>(sample(ridges.noise, way.at(s)), 1e-30);
   return sum / std::max(1, n);
 }
 
-/// How badly two fibres fit to one across a gap, over how bright the way between them is; nothing where they do not.
-/// Fibres that lie on one parabola to a fraction of their width, with something brighter than texture between them, are
-/// nearly always one; the brighter the way, the less they need to fit: measured in notes/dense_fibres.md.
-std::optional<double> mismatch_across(const EndPoint& a, const EndPoint& b, const Ridges& ridges,
-                                      const TraceRule& rule) {
-  constexpr double kBrighter = 0.4;  // the way between two fibres that are not one is rarely so bright
-  constexpr double kTurn = 0.5;      // rad: parabolas of that radius turn less
-  constexpr double kHeight = 1;      // logarithm: 19 of 20 pairs of pieces of one fibre differ by less
-  constexpr double kMisfit = 1.3, kWorst = 2;
-  if (angle_between(a.outward, -b.outward) > kTurn) return std::nullopt;
-  const Parabola way = parabola_through(a.part, b.part);
-  const double gap = way.to - way.from;
-  if (gap < 0 || gap > rule.bridge_px) return std::nullopt;
-  const double misfit = way.misfit_px / rule.bridge_misfit_px, bend = way.curvature() * rule.bridge_radius_px;
-  const double height = std::abs(std::log(a.height / b.height));
-  if (misfit > kMisfit || bend > 1 || !(height <= kHeight)) return std::nullopt;
-  const double bright = over_noise_between(way, ridges), far = gap / rule.bridge_px;
-  const double mismatch = (misfit * misfit + bend * bend + far * far + height * height) / bright;
-  return bright >= kBrighter && mismatch <= kWorst ? std::optional(mismatch) : std::nullopt;
-}
-
-/// How probable it is that two ends are of one fibre.
-double chance_of_one_fibre(const EndPoint& a, const EndPoint& b, const TraceRule& rule) {
-  constexpr double kTurn = 0.5;                           // rad, as above
-  constexpr double kLeastMisfit = 0.4, kLeastBend = 0.3;  // of those that bridged() allows: less says no more
-  constexpr std::array kCoefficients{1.67, -2.54, -1.23, -1.86, -1.78};
+/// How probable it is that two ends that face each other are of one fibre: that they lie on one parabola to a fraction
+/// of their width, and the way between them is brighter than texture. Logistic regression (notes/dense_fibres.md).
+double chance_of_one_fibre(const EndPoint& a, const EndPoint& b, const Ridges& ridges, const TraceRule& rule) {
+  constexpr double kTurn = 0.5;              // rad: parabolas of that radius turn less
+  constexpr double kDark = -1, kBright = 4;  // what lies beyond says no more
+  constexpr std::array kCoefficients{4.89, -1.48, -2.27, -3.16, -2.53, 1.39};
   if (angle_between(a.outward, -b.outward) > kTurn) return 0;
   const Parabola way = parabola_through(a.part, b.part);
   const double gap = (way.to - way.from) / rule.bridge_px, height = std::abs(std::log(a.height / b.height));
-  if (gap < -0.3 || !std::isfinite(height)) return 0;
-  return logistic({1, std::log(std::max(way.misfit_px / rule.bridge_misfit_px, kLeastMisfit)),
-                   std::log(std::max(way.curvature() * rule.bridge_radius_px, kLeastBend)), std::max(gap, 0.0), height},
+  if (gap < 0 || gap > 1 || way.along.dot(a.outward) < 0 || !std::isfinite(height)) return 0;
+  return logistic({1, way.misfit_px / rule.bridge_misfit_px, way.curvature() * rule.bridge_radius_px, gap, height,
+                   std::clamp(over_noise_between(way, ridges), kDark, kBright)},
                   kCoefficients);
 }
 
@@ -260,19 +237,24 @@ std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const
   return result;
 }
 
-std::vector<double> chances_of_going_on(const std::vector<Trace>& fibres, const TraceRule& rule) {
+std::vector<double> chances_of_going_on(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule) {
   const auto ends = ends_of(fibres, rule);
   std::vector<double> chances(ends.size());
-  const auto chance = [&](End a, End b) { return std::optional(chance_of_one_fibre(ends[a], ends[b], rule)); };
-  for (const Fit& fit : fits_of(ends, 2 * rule.bridge_px, chance))  // the best come last
+  const auto chance = [&](End a, End b) { return std::optional(chance_of_one_fibre(ends[a], ends[b], ridges, rule)); };
+  for (const Fit& fit : fits_of(ends, rule.bridge_px, chance))  // the best come last
     chances[fit.a] = chances[fit.b] = fit.mismatch;
   return chances;
 }
 
 std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule) {
   const auto ends = ends_of(fibres, rule);
-  const auto fits =
-      fits_of(ends, rule.bridge_px, [&](End a, End b) { return mismatch_across(ends[a], ends[b], ridges, rule); });
+  const auto fits = fits_of(ends, rule.bridge_px, [&](End a, End b) {
+    constexpr double kBrighter = 0.4;  // in a dark gap one pair of four is of two fibres
+    const double chance = chance_of_one_fibre(ends[a], ends[b], ridges, rule);
+    if (chance <= 0.5 || over_noise_between(parabola_through(ends[a].part, ends[b].part), ridges) < kBrighter)
+      return std::optional<double>();
+    return std::optional(1 - chance);
+  });
   std::vector<BridgedLine> result;
   for (const std::vector<End>& chain : chains_of(links_of(fits, fibres.size()))) {
     BridgedLine line;

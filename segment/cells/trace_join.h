@@ -45,14 +45,13 @@ struct BridgedLine {
 };
 
 /// Fibres put together across gaps that are longer than a hidden line's: over the rim of the nucleus, or where a
-/// neighbour in the same carpet outshines them. Both must be long and lie on one slightly bent parabola, and the way
-/// between must be brighter than texture. The best pair first.
+/// neighbour in the same carpet outshines them. Pairs of ends that are of one fibre rather than not, the best first.
 /// @param ridges  of the image without these fibres: what is bright in a gap is no neighbour
 std::vector<BridgedLine> bridged(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule);
 
 /// By end, the first of each line before its last, how probable it is that the line goes on as another one: that of the
 /// best partner, by logistic regression on simulated cells (notes/dense_fibres.md).
-std::vector<double> chances_of_going_on(const std::vector<Trace>& fibres, const TraceRule& rule);
+std::vector<double> chances_of_going_on(const std::vector<Trace>& fibres, const Ridges& ridges, const TraceRule& rule);
 
 /// Where lines cross at a small angle one may be led on over the other's course, and the other ends there. A line that
 /// ends on another one gets back the part of it that lies on its own course: if both together lie on a slightly bent

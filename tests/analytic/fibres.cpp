@@ -132,7 +132,7 @@ TEST(Fibres, are_less_surely_dorsal_if_another_one_goes_on_or_the_free_end_lies_
     return fibres.size() == lines.size() && fibres[0].type == FibreType::dorsal ? fibres[0].type_confidence : -9;
   };
   EXPECT_GT(confidence({{{3, 12}, {9, 12}}}), 0.95);
-  EXPECT_LT(std::abs(confidence({{{3, 12}, {9.5, 12}}, {{16, 12}, {22, 12}}})), 0.9);
+  EXPECT_LT(std::abs(confidence({{{3, 12}, {9.5, 12}}, {{14, 12}, {20, 12}}})), 0.9);
   EXPECT_LT(std::abs(confidence({{{12, 20}, {6, 20}}})), 0.9);
 }
 

@@ -37,23 +37,21 @@ TEST(FibrePieces, on_one_line_are_put_together_across_a_gap_as_long_as_a_bridge_
   EXPECT_EQ(n_lines(left, trace_of(90 + longest + 5, 280, level)), 2);
 }
 
-TEST(FibrePieces, stay_apart_where_the_gap_is_as_dark_as_texture) {
-  EXPECT_EQ(n_lines(trace_of(20, 110, level), trace_of(150, 280, level), 0.2), 2);
-}
-
-TEST(FibrePieces, need_to_fit_the_less_the_brighter_the_way_between_them_is) {
-  const Trace left = trace_of(20, 110, level), aside = trace_of(150, 280, [](double) { return 155.0; });
+TEST(FibrePieces, need_to_fit_the_less_the_brighter_the_way_between_them_is_and_no_texture_joins_them) {
+  const Trace left = trace_of(20, 110, level), aside = trace_of(150, 280, [](double) { return 163.0; });
   EXPECT_EQ(n_lines(left, aside, 0.5), 2);
   EXPECT_EQ(n_lines(left, aside, 3), 1);
   EXPECT_EQ(n_lines(left, trace_of(150, 280, level), 0.5), 1);
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, level), 0.2), 2);
 }
 
-TEST(FibrePieces, stay_apart_beside_each_other_at_an_angle_and_where_one_is_far_brighter) {
+TEST(FibrePieces, stay_apart_beside_each_other_at_an_angle_back_to_back_and_where_one_is_far_brighter) {
   const Trace left = trace_of(20, 110, level);
-  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double) { return 156.0; })),
-            2);  // two of a fibre's radii aside
-  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double x) { return 150 + 0.36 * (x - 130); })), 2);  // 20°
-  EXPECT_EQ(n_lines(left, trace_of(150, 280, level, 8 * 3)), 2);
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double) { return 170.0; })), 2);
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, [](double x) { return 150 + 0.58 * (x - 130); })), 2);  // 30°
+  EXPECT_EQ(n_lines(left, trace_of(150, 280, level, 8 * 12)), 2);
+  const std::vector<Trace> row = {trace_of(60, 90, level), trace_of(100, 130, level)};
+  EXPECT_EQ(chances_of_going_on(row, even_ridges(2), TraceRule{})[0], 0);
 }
 
 /// The order and the direction of pieces mean nothing.
