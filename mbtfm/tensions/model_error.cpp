@@ -80,8 +80,7 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   constexpr Index kEnough = 20;
   const bool is_known = data.n_felt - followed.cols() >= kEnough;
   const double phi = std::max(least, measured);
-  return {.phi_nN = phi,
-          .least_phi_nN = least,
+  return {.least_phi_nN = least,
           .measured_phi_nN = is_known ? measured : least / (1 + static_cast<double>(meshes.size())),
           .phi_of_mean_nN = least / (1 + static_cast<double>(meshes.size())),
           .loads_nN = loads,

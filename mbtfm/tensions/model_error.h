@@ -18,8 +18,7 @@
 namespace mbtfm::tensions {
 
 struct ModelError {
-  double phi_nN = 0;           ///< as the misfit calls for, but not below
-  double least_phi_nN = 0;     ///< that of one further mesh about the mean of these
+  double least_phi_nN = 0;     ///< that of one further mesh about the mean of these: phi is no less
   double measured_phi_nN = 0;  ///< as the misfit alone has it, of the cell's network and the mean's together;
                                ///< the mean's if there are too few adhesions to determine it
   double phi_of_mean_nN = 0;   ///< what the meshes show of their mean's own

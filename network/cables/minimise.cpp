@@ -324,7 +324,9 @@ class ConjugateGradients : public Descent {
   int n_stuck_ = 0;
 };
 
-std::string reason_of(const Report& report, const MinimiseOptions& options) {
+Minimum finished(Descent&& found, Report report, const MinimiseOptions& options) {
+  report.last_change = found.residual_nN();
+  report.converged = report.last_change <= options.force_tolerance_nN;
   std::ostringstream text;
   text << "largest net force on a free vertex " << report.last_change << " nN after " << report.iterations
        << (options.method == Contraction::newton ? " Newton steps" : " steps of conjugate gradients") << ", wanted "
@@ -332,58 +334,8 @@ std::string reason_of(const Report& report, const MinimiseOptions& options) {
   if (!report.converged)
     text << "; more steps may help, or an axial stiffness nearer to the tensions (force scale " << options.force_nN
          << " nN)";
-  return text.str();
-}
-
-Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> positions_um,
-                           Start start, const MinimiseOptions& options) {
-  const Rounding sharp{.eps_um = options.eps_um, .mu_fJ = 0};
-  Newton minimiser(free, cables, std::move(positions_um), sharp);
-  Report report;
-  const auto has_converged = [&] { return minimiser.residual_nN() <= options.force_tolerance_nN; };
-  const auto may_step = [&](int limit) { return report.iterations < std::min(limit, options.max_iterations); };
-  const auto step = [&] {
-    ++report.iterations;
-    return minimiser.step();
-  };
-
-  if (start == Start::warm)
-    while (!has_converged() && may_step(kWarmSteps)) step();
-  if (!has_converged()) {
-    const double unit_mu_fJ = options.force_nN * options.edge_length_um;
-    Rounding rounding{.eps_um = kFirstEps * options.edge_length_um, .mu_fJ = kFirstMu * unit_mu_fJ};
-    const double last_mu_fJ = kLastMu * options.weakest * unit_mu_fJ;
-    minimiser.set_rounding(rounding);
-    minimiser.reset_duals();
-    while (rounding.mu_fJ >= last_mu_fJ) {
-      minimiser.set_rounding(rounding);
-      const double flat_fJ = rounding.mu_fJ * static_cast<double>(cables.size());
-      Newton::Step taken;
-      int n_steps = 0;
-      while (may_step(options.max_iterations) &&
-             (taken.length < kFullStep || -taken.slope_fJ > flat_fJ || minimiser.residual_nN() > options.force_nN)) {
-        taken = step();
-        ++n_steps;
-      }
-      rounding.mu_fJ *= n_steps == 1 ? kBoldSharpening : kSharpening;
-      rounding.eps_um = std::max(kSharpening * rounding.eps_um, options.eps_um);
-    }
-    minimiser.set_rounding(sharp);
-  }
-  const auto converge = [&] {
-    while (!has_converged() && may_step(options.max_iterations)) step();
-  };
-  converge();
-  if (options.is_polished && minimiser.residual_nN() > kPolished * options.force_nN &&
-      may_step(options.max_iterations)) {
-    step();
-    converge();  // where a cable was still to begin or to cease to stretch, that step showed it
-  }
-
-  report.last_change = minimiser.residual_nN();
-  report.converged = has_converged();
-  report.reason = reason_of(report, options);
-  return std::move(minimiser).result(std::move(report));
+  report.reason = text.str();
+  return std::move(found).result(std::move(report));
 }
 
 Minimum minimise_by_conjugate_gradients(const FreeVertices& free, const std::vector<Cable>& cables,
@@ -394,10 +346,7 @@ Minimum minimise_by_conjugate_gradients(const FreeVertices& free, const std::vec
     ++report.iterations;
     if (!minimiser.step()) break;
   }
-  report.last_change = minimiser.residual_nN();
-  report.converged = report.last_change <= options.force_tolerance_nN;
-  report.reason = reason_of(report, options);
-  return std::move(minimiser).result(std::move(report));
+  return finished(std::move(minimiser), std::move(report), options);
 }
 
 }  // namespace
@@ -406,7 +355,46 @@ Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std
                  Start start, const MinimiseOptions& options) {
   if (options.method == Contraction::conjugate_gradient)
     return minimise_by_conjugate_gradients(free, cables, std::move(positions_um), options);
-  return minimise_by_newton(free, cables, std::move(positions_um), start, options);
+  const Rounding sharp{.eps_um = options.eps_um, .mu_fJ = 0};
+  Newton minimiser(free, cables, std::move(positions_um), sharp);
+  Report report;
+  const auto has_converged = [&] { return minimiser.residual_nN() <= options.force_tolerance_nN; };
+  const auto may_step = [&](int limit) { return report.iterations < std::min(limit, options.max_iterations); };
+  const auto step = [&] {
+    ++report.iterations;
+    return minimiser.step();
+  };
+  const auto converge = [&](int limit) {
+    while (!has_converged() && may_step(limit)) step();
+  };
+
+  if (start == Start::warm) converge(kWarmSteps);
+  if (!has_converged()) {
+    const double unit_mu_fJ = options.force_nN * options.edge_length_um;
+    Rounding rounding{.eps_um = kFirstEps * options.edge_length_um, .mu_fJ = kFirstMu * unit_mu_fJ};
+    const double last_mu_fJ = kLastMu * options.weakest * unit_mu_fJ;
+    minimiser.set_rounding(rounding);
+    minimiser.reset_duals();
+    while (rounding.mu_fJ >= last_mu_fJ) {
+      minimiser.set_rounding(rounding);
+      const double flat_fJ = rounding.mu_fJ * static_cast<double>(cables.size());
+      Newton::Step taken;
+      const int n_before = report.iterations;
+      while (may_step(options.max_iterations) &&
+             (taken.length < kFullStep || -taken.slope_fJ > flat_fJ || minimiser.residual_nN() > options.force_nN))
+        taken = step();
+      rounding.mu_fJ *= report.iterations == n_before + 1 ? kBoldSharpening : kSharpening;
+      rounding.eps_um = std::max(kSharpening * rounding.eps_um, options.eps_um);
+    }
+    minimiser.set_rounding(sharp);
+  }
+  converge(options.max_iterations);
+  if (options.is_polished && minimiser.residual_nN() > kPolished * options.force_nN &&
+      may_step(options.max_iterations)) {
+    step();
+    converge(options.max_iterations);  // where a cable was still to begin or to cease to stretch, that step showed it
+  }
+  return finished(std::move(minimiser), std::move(report), options);
 }
 
 }  // namespace mbtfm::cables

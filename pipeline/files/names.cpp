@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <memory>
+#include <sstream>
 
 namespace mbtfm::files {
 
@@ -120,6 +121,16 @@ std::string lower_case(std::string text) {
   for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return text;
+}
+
+std::vector<std::string> parts_of(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream stream(list);
+  for (std::string part; std::getline(stream, part, ',');) {
+    const auto first = part.find_first_not_of(' '), last = part.find_last_not_of(' ');
+    if (first != part.npos) parts.push_back(part.substr(first, last - first + 1));
+  }
+  return parts;
 }
 
 bool is_hidden(const std::filesystem::path& file) { return file.filename().native().starts_with('.'); }

@@ -30,6 +30,9 @@ std::string folded(std::string_view text);
 /// Letters of ASCII as small ones.
 std::string lower_case(std::string text);
 
+/// The parts between commas, without spaces around them and none of them empty.
+std::vector<std::string> parts_of(const std::string& list);
+
 /// Whether the name begins with a point: it is no cell, no frame, no picture and no table, wherever it lies.
 bool is_hidden(const std::filesystem::path& file);
 

@@ -11,15 +11,8 @@
 
 namespace mbtfm::report {
 
-struct FibreMatchParameters {
-  /// Two lines further apart on average are different fibres: about the spacing of bundles that one can resolve, and
-  /// it admits a fibre that was followed over 60 % of its length or more (a 10 um long one that lacks 4 um at an end
-  /// is 0.4 · 2 um = 0.8 um away).
-  double largest_distance_um = 1.5;
-  double step_um = 0.25;  ///< between the points at which the distance is taken: fine against largest_distance_um
-};
-
-/// Mean distance of the points of each line from the other line; of the two directions, the larger.
+/// Mean distance of the points of each line from the other line, taken at points `step_um` apart; of the two
+/// directions, the larger.
 double line_distance_um(const Polyline& a, const Polyline& b, double step_um);
 
 struct FibreMatch {
@@ -29,8 +22,7 @@ struct FibreMatch {
 };
 
 /// Pairs of one found and one true fibre each, the closest first; fibres without a partner are left out.
-std::vector<FibreMatch> match_fibres(const std::vector<Fibre>& found, const std::vector<Fibre>& truth,
-                                     const FibreMatchParameters& parameters = {});
+std::vector<FibreMatch> match_fibres(const std::vector<Fibre>& found, const std::vector<Fibre>& truth);
 
 /// A found fibre, a true one, or both.
 struct ComparedFibre {

@@ -29,10 +29,10 @@ std::string percent(double share) { return two_digits(100 * share) + " %"; }
 
 /// Empty where the image shows the whole cell.
 std::string of_cut(const FitSummary& fit) {
-  const auto cut = cut_force_of(fit);
-  if (!cut) return {};
-  return " " + sentence("cell.cut", readable(cut->force_nN), readable(cut->sigma_nN), readable(cut->x_nN),
-                        readable(cut->x_sigma_nN), readable(cut->y_nN), readable(cut->y_sigma_nN));
+  if (!figure_of(fit, "cut_force_nN")) return {};
+  const auto of = [&](const char* name) { return readable(figure_of(fit, name).value_or(0)); };
+  return " " + sentence("cell.cut", of("cut_force_nN"), of("cut_force_sigma_nN"), of("cut_force_x_nN"),
+                        of("cut_force_x_sigma_nN"), of("cut_force_y_nN"), of("cut_force_y_sigma_nN"));
 }
 
 /// Those that were seen, and those that were put where nobody saw one.

@@ -60,6 +60,16 @@ std::string legend(const std::string& items) {
   return items.empty() ? items : "<div class=\"legend\">" + items + "</div>\n";
 }
 
+VectorField displacement_of(const DisplacementField& beads) {
+  VectorField field;
+  for (const Bead& bead : beads) {
+    if (!bead.flag.empty()) continue;
+    field.positions_um.push_back(bead.position_um);
+    field.vectors.push_back(bead.displacement_um);
+  }
+  return field;
+}
+
 double averaging_side_um(const VectorField& field, const Extent& box) {
   const Vec2 size = box.high_um - box.low_um;
   const auto n_inside = std::ranges::count_if(field.positions_um, [&](Vec2 p) { return is_inside(box, p); });

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/beads.h"
 #include "pipeline/contract/extent.h"
 
 namespace mbtfm::report {
@@ -31,6 +32,9 @@ std::string legend(const std::string& items);
 struct VectorField {
   std::vector<Vec2> positions_um, vectors = {};
 };
+
+/// The displacement of the beads that are not flagged.
+VectorField displacement_of(const DisplacementField& beads);
 
 /// Means over square cells that hold at least three points.
 struct AveragedField {

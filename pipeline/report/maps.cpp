@@ -344,12 +344,7 @@ Figure contracted_network_map(const CellResults& results) {
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {
-  VectorField measured, fitted, residual;
-  for (const Bead& bead : results.displacement) {
-    if (!bead.flag.empty()) continue;
-    measured.positions_um.push_back(bead.position_um);
-    measured.vectors.push_back(bead.displacement_um);
-  }
+  const VectorField measured = displacement_of(results.displacement);
   const Extent box = map_box(results);
   const double side_um = averaging_side_um(measured, box);
   const AveragedField means = averaged(measured, box, side_um);
@@ -364,8 +359,8 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
   std::vector<Figure> figures = {drawn(means.means, "Measured displacement", "displacement",
                                        sentence("maps.displacement", side_um, means.mean_members))};
   if (!results.residual) return figures;
-  residual = {results.residual->positions_um, results.residual->residual_um};
-  fitted = measured;
+  const VectorField& residual = *results.residual;
+  VectorField fitted = measured;
   for (std::size_t i = 0; i < fitted.vectors.size(); ++i) fitted.vectors[i] = fitted.vectors[i] - residual.vectors[i];
   figures.push_back(drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
                           sentence("maps.displacement-of-model")));

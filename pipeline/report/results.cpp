@@ -17,10 +17,10 @@ namespace mbtfm::report {
 namespace {
 
 /// Both files hold the unflagged beads in the same order. @throws InputError where they do not
-std::optional<Residual> residual_of(const DisplacementField& measured, const Path& fitted_file) {
+std::optional<VectorField> residual_of(const DisplacementField& measured, const Path& fitted_file) {
   if (!files::is_own_file(fitted_file)) return {};
   const DisplacementField fitted = files::read_displacement(fitted_file);
-  Residual residual;
+  VectorField residual;
   for (const Bead& bead : measured) {
     if (!bead.flag.empty()) continue;
     const std::size_t i = residual.positions_um.size();
@@ -29,7 +29,7 @@ std::optional<Residual> residual_of(const DisplacementField& measured, const Pat
                        "run the fit again: mbtfm run --redo fit");
     }
     residual.positions_um.push_back(bead.position_um);
-    residual.residual_um.push_back(bead.displacement_um - fitted[i].displacement_um);
+    residual.vectors.push_back(bead.displacement_um - fitted[i].displacement_um);
   }
   return residual;
 }
@@ -131,24 +131,6 @@ std::optional<double> figure_of(const FitSummary& fit, std::string_view name) {
   return {};
 }
 
-std::optional<CutForce> cut_force_of(const FitSummary& fit) {
-  std::optional<CutForce> cut;
-  const auto read = [&](const char* name, double CutForce::*member) {
-    const auto value = figure_of(fit, name);
-    if (!value) return;
-    if (!cut) cut.emplace();
-    (*cut).*member = *value;
-  };
-  read("cut_force_x_nN", &CutForce::x_nN);
-  read("cut_force_x_sigma_nN", &CutForce::x_sigma_nN);
-  read("cut_force_y_nN", &CutForce::y_nN);
-  read("cut_force_y_sigma_nN", &CutForce::y_sigma_nN);
-  read("cut_force_nN", &CutForce::force_nN);
-  read("cut_force_sigma_nN", &CutForce::sigma_nN);
-  read("cut_torque_nN_um", &CutForce::torque_nN_um);
-  return cut;
-}
-
 Balance balance_of(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
   Vec2 centre;
@@ -166,11 +148,10 @@ Balance balance_of(const CellResults& results) {
     lever += norm(arm) * norm(force.force_nN);
   }
   if (!(magnitudes > 0)) return {};
-  if (const auto cut = cut_force_of(results.fit)) {
-    const Vec2 force_nN{cut->x_nN, cut->y_nN};
-    net += force_nN;
-    torque += cut->torque_nN_um - cross(centre, force_nN);
-  }
+  const auto of_cut = [&](const char* name) { return figure_of(results.fit, name).value_or(0); };
+  const Vec2 cut_nN{of_cut("cut_force_x_nN"), of_cut("cut_force_y_nN")};
+  net += cut_nN;
+  torque += of_cut("cut_torque_nN_um") - cross(centre, cut_nN);
   return {.net_force = norm(net) / magnitudes,
           .net_torque = lever > 0 ? std::abs(torque) / lever : 0,
           .has_moments = has_moments};

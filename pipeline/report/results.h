@@ -7,20 +7,15 @@
 #include <vector>
 
 #include "pipeline/contract/beads.h"
-#include "pipeline/contract/extent.h"
 #include "pipeline/contract/fit_summary.h"
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/report/compare.h"
+#include "pipeline/report/map_parts.h"
 
 namespace mbtfm::report {
-
-/// What the fitted model leaves of the measured displacement, at the beads.
-struct Residual {
-  std::vector<Vec2> positions_um, residual_um;
-};
 
 /// The images behind a segmentation, as one picture, and where it lies.
 struct Images {
@@ -49,7 +44,7 @@ struct CellResults {
   std::map<int, Tension> tensions;  ///< by fibre id; 0: the actin network
   std::vector<AdhesionForce> forces;
   FitSummary fit;
-  std::optional<Residual> residual;
+  std::optional<VectorField> residual;  ///< what the fitted model leaves of the measured displacement, at the beads
   std::optional<UsualMethod> usual_method;
   std::optional<Comparison> comparison;  ///< of a simulated cell
   std::optional<Images> images = {};     ///< of the cell
@@ -76,12 +71,5 @@ Balance balance_of(const CellResults& results);
 
 /// A number of fit.json; none where it is not there or is no number.
 std::optional<double> figure_of(const FitSummary& fit, std::string_view name);
-
-/// What passes through the image's cut, of fit.json.
-struct CutForce {
-  double x_nN = 0, x_sigma_nN = 0, y_nN = 0, y_sigma_nN = 0, force_nN = 0, sigma_nN = 0, torque_nN_um = 0;
-};
-/// None where the image shows the whole cell.
-std::optional<CutForce> cut_force_of(const FitSummary& fit);
 
 }  // namespace mbtfm::report

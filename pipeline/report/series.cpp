@@ -6,7 +6,6 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/own_files.h"
-#include "pipeline/report/map_parts.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/report.h"
@@ -38,12 +37,8 @@ std::vector<Frame> frames_of(const Path& cell, const Extent& box) {
     frame.time = table.optional_number(row, "time_s").value_or(frame.number);
     frame.force_nN = *force_nN;
     frame.sigma_nN = table.optional_number(row, "total_force_sigma_nN").value_or(0);
-    VectorField all;
-    for (const Bead& bead : files::read_displacement(cell / "2_track" / files::displacement_of_frame(frame.number))) {
-      if (!bead.flag.empty()) continue;
-      all.positions_um.push_back(bead.position_um);
-      all.vectors.push_back(bead.displacement_um);
-    }
+    const VectorField all =
+        displacement_of(files::read_displacement(cell / "2_track" / files::displacement_of_frame(frame.number)));
     if (side_um == 0) side_um = averaging_side_um(all, box);
     frame.displacement = averaged(all, box, side_um).means;
   }

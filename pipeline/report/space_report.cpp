@@ -33,12 +33,6 @@ Sum sum_of(const SpaceResults& r, const std::string& name, const std::string& un
   return sum;
 }
 
-double largest_traction_kPa(const SpaceResults& r) {
-  double largest = 0;
-  for (const SurfaceTraction& t : r.tractions) largest = std::max(largest, norm(t.traction_kPa));
-  return largest;
-}
-
 std::vector<std::string> facts_of(const SpaceResults& r) {
   const Sum force = sum_of(r, "net_force", "nN"), moment = sum_of(r, "moment", "nN_um");
   const double total = r.number("total_force_nN");
@@ -56,7 +50,7 @@ std::vector<std::string> facts_of(const SpaceResults& r) {
   }
   facts.push_back(sentence("space.total", with_error(total, r.find("total_force_sigma_nN"), "nN"),
                            r.texts.at("tractions_over"), readable(r.number("normal_force_nN")),
-                           readable(largest_traction_kPa(r))));
+                           readable(largest_kPa(map_of(r)))));
   if (const auto flipped = r.find("flipped_z_chi_squared")) {
     facts.push_back(sentence("space.sign-of-z", readable(std::abs(*flipped)), *flipped < 0 ? "smaller" : "larger",
                              *flipped < 0 ? " " + sentence("space.sign-of-z-hint") : ""));

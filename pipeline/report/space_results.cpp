@@ -94,6 +94,12 @@ SpaceMap map_of(const SpaceResults& results) {
   return map;
 }
 
+double largest_kPa(const SpaceMap& map) {
+  double largest = 0;
+  for (const Vec3& t : map.traction_kPa) largest = std::max(largest, norm(t));
+  return largest;
+}
+
 bool has_space_truth(const Path& cell) { return files::is_own_file(cell / kTruth); }
 
 SpaceMap true_space_map(const Path& cell) {

@@ -50,6 +50,8 @@ struct SpaceMap {
 };
 /// What the stage found.
 SpaceMap map_of(const SpaceResults& results);
+/// Its strongest traction's size.
+double largest_kPa(const SpaceMap& map);
 
 /// Of a simulated cell.
 bool has_space_truth(const Path& cell);

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <sstream>
 
 #include "pipeline/contract/words.h"
 #include "pipeline/files/csv.h"
+#include "pipeline/files/names.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 
@@ -62,8 +62,7 @@ Table table_of(const Listing& listing) {
     if (std::ranges::all_of(listing.only, [&](const auto& is) { return csv.text(row, is.first) == is.second; }))
       rows.push_back(row);
   table.rows.resize(rows.size());
-  std::istringstream list(listing.columns);
-  for (std::string part; std::getline(list >> std::ws, part, ',');) {
+  for (const std::string& part : files::parts_of(listing.columns)) {
     const bool is_of_columns = part.starts_with('*');
     const std::size_t colon = part.find(": ");
     const std::string column = part.substr(is_of_columns ? 1 : 0, colon - (is_of_columns ? 1 : 0));

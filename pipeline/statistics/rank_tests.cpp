@@ -170,12 +170,6 @@ std::vector<double> holm(const std::vector<double>& p_values) {
   return corrected;
 }
 
-ClusteredRanks clustered_ranks(const std::vector<ClusteredValue>& values) {
-  const CellRanks ranks = ranks_by_cell(values);
-  const VectorXd sum = ranks.sum.colwise().sum(), expected = ranks.expected.colwise().sum();
-  return {{sum.begin(), sum.end()}, {expected.begin(), expected.end()}};
-}
-
 TestResult clustered_rank_test(const std::vector<ClusteredValue>& values) {
   const CellRanks ranks = ranks_by_cell(values);
   const Index q = ranks.sum.cols() - 1;  // the groups' sums add up to a constant: leave out the last

@@ -36,13 +36,6 @@ struct ClusteredValue {
 /// @throws InvalidData for fewer than two groups, an empty one, too few cells, or groups without any scatter
 TestResult clustered_rank_test(const std::vector<ClusteredValue>& values);
 
-/// What the test sums: by group, the mean over all draws of its rank sum over (cells + 1), and what it would be if the
-/// groups did not differ.
-struct ClusteredRanks {
-  std::vector<double> sum, expected;
-};
-ClusteredRanks clustered_ranks(const std::vector<ClusteredValue>& values);
-
 /// Holm's correction for several tests: the same order as given.
 /// Source: Holm, Scand. J. Stat. 6, 65 (1979).
 std::vector<double> holm(const std::vector<double>& p_values);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/extent.h"
@@ -90,11 +89,10 @@ StudyCell read_study_cell_in_space(const Path& folder, const std::string& name) 
                                     .contractile_moment_nN_um = results.find("contractile_moment_nN_um"),
                                     .contractile_moment_sigma_nN_um = results.find("contractile_moment_sigma_nN_um"),
                                     .normal_force_nN = results.number("normal_force_nN"),
+                                    .largest_traction_kPa = report::largest_kPa(report::map_of(results)),
                                     .net_force_nN = norm(results.vector("net_force", "nN")),
                                     .net_moment_nN_um = norm(results.vector("moment", "nN_um")),
                                     .resolution_um = results.find("median_resolution_um")}};
-  for (const SurfaceTraction& t : results.tractions)
-    c.space->largest_traction_kPa = std::max(c.space->largest_traction_kPa, norm(t.traction_kPa));
   for (const PartForce& f : results.forces)
     c.space->adhesions.push_back({f.adhesion_id, norm(f.force_nN), f.magnitude_sigma_nN});
   c.cell.outline_um = results.outline_um;
@@ -161,23 +159,12 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
     if (originals[i]) reasons[i] = runner::why_a_copy(names[*originals[i]], field_of(*read[i]), cells[i]);
 }
 
-/// The parts between commas, without spaces around them.
-std::vector<std::string> parts_of(const std::string& list) {
-  std::vector<std::string> parts;
-  std::istringstream stream(list);
-  for (std::string part; std::getline(stream, part, ',');) {
-    const auto first = part.find_first_not_of(' '), last = part.find_last_not_of(' ');
-    if (first != part.npos) parts.push_back(part.substr(first, last - first + 1));
-  }
-  return parts;
-}
-
 /// Those that are asked for come first, in that order.
 /// @throws UsageError where one is asked for that no cell has
 void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell, const std::string& order) {
   std::set<std::string, decltype(&files::is_before)> names(condition_of_cell.begin(), condition_of_cell.end(),
                                                            &files::is_before);  // 2 kPa before 10 kPa
-  for (const std::string& asked : parts_of(order)) {
+  for (const std::string& asked : files::parts_of(order)) {
     const auto name = std::ranges::find(names, files::folded(asked), files::folded);
     if (name == names.end())
       throw UsageError("stats.conditions: no cell that enters is of the condition '" + asked + "'; " +
@@ -206,7 +193,7 @@ std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::st
 
 /// @throws UsageError where an id is none
 std::vector<std::string> excluding_findings(const StudyParameters& parameters) {
-  std::vector<std::string> ids = parts_of(parameters.exclude_findings);
+  std::vector<std::string> ids = files::parts_of(parameters.exclude_findings);
   for (std::string& id : ids) {
     id = present_id(id);
     if (std::ranges::none_of(kinds_of_findings(), [&](const KindOfFinding& kind) { return kind.id == id; }))
@@ -262,10 +249,6 @@ std::vector<double> thresholds_nN(const StudyParameters& parameters) {
 
 int n_of_kind(const Study& study, CellKind kind) {
   return static_cast<int>(std::ranges::count_if(study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
-}
-
-int n_with_fibres(const Study& study) {
-  return static_cast<int>(std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_fibres(c.kind()); }));
 }
 
 const KindInStudy& in_study(CellKind kind) {

@@ -246,9 +246,7 @@ Columns<Summary> summary_columns(const std::string& counted, const std::string& 
 
 /// A share of the fibres above a tension; of a cell without its interval.
 struct ShareRow {
-  double value = 0;
-  std::optional<Interval> interval = {};
-  std::optional<double> without_error = {};
+  Number value = {}, low = {}, high = {}, without_error = {};
 };
 struct TypeRow {
   Summary summary;
@@ -265,18 +263,15 @@ Table<TypeRow> type_table(const std::vector<double>& thresholds_nN) {
           columns_of(&TypeRow::summary, summary_columns("fibres", "_nN"))}};
   for (std::size_t k = 0; k < thresholds_nN.size(); ++k) {
     const std::string name = fmt::format("fraction_above_{:g}_nN", thresholds_nN[k]);
-    const auto of = [k](auto figure) {
-      return [k, figure](const TypeRow& row) {
-        return k < row.shares.size() ? figure(row.shares[k]) : figure(ShareRow{});
-      };
-    };
-    const auto low = [](const ShareRow& s) { return s.interval ? Number(s.interval->low) : Number(); };
-    const auto high = [](const ShareRow& s) { return s.interval ? Number(s.interval->high) : Number(); };
-    table.columns.push_back(
-        {{name, of([](const ShareRow& s) { return Number(s.value); }), kResult},
-         {name + "_low", of(low), kResult},
-         {name + "_high", of(high), kResult},
-         {name + "_without_error", of([](const ShareRow& s) { return s.without_error; }), kResult}});
+    using Figure = std::pair<const char*, Number ShareRow::*>;
+    for (const auto& [end, figure] :
+         {Figure{"", &ShareRow::value}, Figure{"_low", &ShareRow::low}, Figure{"_high", &ShareRow::high},
+          Figure{"_without_error", &ShareRow::without_error}})
+      table.columns.push_back({name + end,
+                               [k, figure = figure](const TypeRow& row) {
+                                 return k < row.shares.size() ? row.shares[k].*figure : Number();
+                               },
+                               kResult});
   }
   return table;
 }
@@ -295,7 +290,8 @@ std::vector<TypeRow> type_rows(const Study& study, const Analysis& analysis) {
     TypeRow& row = rows.emplace_back(TypeRow{s, {}});
     for (const ShareAbove& share : analysis.shares)
       if (share.condition == s.condition && share.kind == s.kind)
-        row.shares.push_back({share.share.value, share.share.interval, share.without_error});
+        row.shares.push_back(
+            {share.share.value, share.share.interval.low, share.share.interval.high, share.without_error});
   }
   const Sample& sample = analysis.tensions().sample;
   for (const Summary& s : analysis.tensions_by_cell) {

@@ -179,19 +179,15 @@ Precision powers(Precision p, double power) {
 }
 
 /// a + factor b
-Precision sum(Precision a, const Precision& b, double factor) {
-  if (a.tensions.size() == 0) {
-    a = b;
-    a.tensions.setZero();
-    a.adhesion_forces.setZero();
-    a.free_forces.setZero();
-    a.total_force = 0;
-  }
-  a.tensions += factor * b.tensions;
-  a.adhesion_forces += factor * b.adhesion_forces;
-  a.free_forces += factor * b.free_forces;
-  a.total_force += factor * b.total_force;
-  return a;
+Precision sum(const Precision& a, const Precision& b, double factor) {
+  const auto of = [factor](const Eigen::VectorXd& x, const Eigen::VectorXd& y) -> Eigen::VectorXd {
+    if (x.size() == 0) return factor * y;
+    return x + factor * y;
+  };
+  return {.tensions = of(a.tensions, b.tensions),
+          .total_force = a.total_force + factor * b.total_force,
+          .adhesion_forces = of(a.adhesion_forces, b.adhesion_forces),
+          .free_forces = of(a.free_forces, b.free_forces)};
 }
 
 }  // namespace
@@ -233,7 +229,7 @@ Precision precision_of(const Scene& scene, const KnownCell& cell, const BeadsOnG
                             .total_force = numerics::transposed_matvec(of_forces, directions_of(cell.forces_nN)).norm(),
                             .adhesion_forces = errors_along(of_forces, along),
                             .free_forces = Eigen::VectorXd::Zero(along.size() / 2)};
-    mean = sum(std::move(mean), powers(of_mesh, 2), 1.0 / static_cast<double>(cell.derivatives.size()));
+    mean = sum(mean, powers(of_mesh, 2), 1.0 / static_cast<double>(cell.derivatives.size()));
   }
   mean = powers(std::move(mean), 0.5);
   Eigen::MatrixXd U = Eigen::MatrixXd::Identity(along.size(), along.size());
@@ -256,7 +252,7 @@ Densities precision_at(const Scene& scene, const KnownCell& cell, const std::vec
       const double share = beads_per_um2[k] / beads_per_um2.back();
       const Precision of_draw =
           precision_of(scene, cell, share < 1 ? some_of(densest, share, random) : densest, work.threads);
-      result.precision[k] = sum(std::move(result.precision[k]), powers(of_draw, 2), 1.0 / kDraws);
+      result.precision[k] = sum(result.precision[k], powers(of_draw, 2), 1.0 / kDraws);
     }
   }
   for (Precision& p : result.precision) p = powers(std::move(p), 0.5);

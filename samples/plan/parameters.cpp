@@ -1,10 +1,10 @@
 #include "samples/plan/parameters.h"
 
 #include <algorithm>
-#include <charconv>
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parsed.h"
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::plan {
@@ -14,11 +14,8 @@ namespace {
 constexpr std::size_t kMostNumbers = 12;  // of a list: curves of more cannot be distinguished
 
 /// None if the text is anything else.
-std::optional<double> as_number(const std::string& text) {
-  double value = 0;
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
-  return error == std::errc() && stop == end ? std::optional(value) : std::nullopt;
+std::optional<double> as_number(std::string_view text) {
+  return parsed<double>(text.substr(text.starts_with('+') ? 1 : 0));
 }
 
 double number_in(const std::string& name, const std::string& text, const Range& range) {

@@ -9,10 +9,14 @@ using files::Table;
 namespace {
 
 template <class Row>
-files::Columns<Row> point_columns(const char* density) {
+files::Columns<Row> error_columns(const char* density) {
   return {{"youngs_modulus_kPa", member(&Row::point, &Point::youngs_modulus_kPa), kResult},
           {density, member(&Row::point, &Point::density), kResult},
-          {"noise_um", member(&Row::point, &Point::noise_um), kResult}};
+          {"noise_um", member(&Row::point, &Point::noise_um), kResult},
+          {"quantity", &Row::quantity},
+          {"n", &Row::n},
+          {"standard_error_nN", &Row::standard_error_nN, kResult},
+          {"from_beads_nN", &Row::from_beads_nN, kResult}};
 }
 
 template <class Row>
@@ -38,16 +42,19 @@ Table<Needed> needed_table(const char* file, const std::string& density) {
                       {density + "_for_nine_in_ten", &Row::of_most, kResult}}};
 }
 
+files::Columns<DrawnNumber> drawn_columns() {
+  using Row = DrawnNumber;
+  return {{"true_nN", &Row::true_nN, kResult},
+          {"found_nN", &Row::found_nN, kResult},
+          {"predicted_error_nN", &Row::predicted_error_nN, kResult}};
+}
+
 }  // namespace
 
 Table<Expected> expected_table(Quantity) {
   using Row = Expected;
   return {.file = "plan/plan.csv",
-          .columns = {point_columns<Row>("beads_per_um2"),
-                      {"quantity", &Row::quantity},
-                      {"n", &Row::n},
-                      {"standard_error_nN", &Row::standard_error_nN, kResult},
-                      {"from_beads_nN", &Row::from_beads_nN, kResult},
+          .columns = {error_columns<Row>("beads_per_um2"),
                       {"from_mesh_nN", &Row::from_mesh_nN, kResult},
                       {"from_segmentation_nN", &Row::from_segmentation_nN, kResult},
                       {"from_other_nN", &Row::from_other_nN, kResult},
@@ -59,11 +66,7 @@ Table<Expected> expected_table(Quantity) {
 Table<SpaceExpected> expected_table(SpaceQuantity) {
   using Row = SpaceExpected;
   return {.file = "plan/plan.csv of a cell in space",
-          .columns = {point_columns<Row>("beads_per_um3"),
-                      {"quantity", &Row::quantity},
-                      {"n", &Row::n},
-                      {"standard_error_nN", &Row::standard_error_nN, kResult},
-                      {"from_beads_nN", &Row::from_beads_nN, kResult},
+          .columns = {error_columns<Row>("beads_per_um3"),
                       {"from_background_nN", &Row::from_background_nN, kResult},
                       target_columns<Row>(),
                       {"resolution_um", &Row::resolution_um, kResult},
@@ -83,9 +86,7 @@ Table<DrawnNumber> drawn_table(Quantity) {
   return {.file = "plan/plan_drawn.csv",
           .columns = {{"experiment", &Row::experiment},
                       {"fibre_id", &Row::id},
-                      {"true_nN", &Row::true_nN, kResult},
-                      {"found_nN", &Row::found_nN, kResult},
-                      {"predicted_error_nN", &Row::predicted_error_nN, kResult},
+                      drawn_columns(),
                       {"stated_error_nN", &Row::stated_error_nN, kResult}}};
 }
 
@@ -95,9 +96,7 @@ Table<DrawnNumber> drawn_table(SpaceQuantity) {
           .columns = {{"experiment", &Row::experiment},
                       {"adhesion_id", &Row::id},
                       {"component", &Row::component},
-                      {"true_nN", &Row::true_nN, kResult},
-                      {"found_nN", &Row::found_nN, kResult},
-                      {"predicted_error_nN", &Row::predicted_error_nN, kResult}}};
+                      drawn_columns()}};
 }
 
 Table<CellNumbers> cell_table() {

@@ -186,8 +186,7 @@ std::optional<ChannelAlignment> align_channels(const std::vector<Fibre>& fibres,
                           .shift_sigma_um = {sigma(0), sigma(1)},
                           .turn_sigma_rad = sigma(2),
                           .growth_sigma = sigma(3),
-                          .gain = 2 * (model.log_likelihood(ends, x) - model.log_likelihood(ends, Unknowns{})),
-                          .n_ends = static_cast<int>(ends.size())};
+                          .gain = 2 * (model.log_likelihood(ends, x) - model.log_likelihood(ends, Unknowns{}))};
 }
 
 std::string sentence_of(const ChannelAlignment& a) {

@@ -21,7 +21,6 @@ struct ChannelAlignment {
   double turn_sigma_rad = 0, growth_sigma = 0;
   /// Twice the gain of the log likelihood over images that lie on each other.
   double gain = 0;
-  int n_ends = 0;  ///< fibre ends that show it
   Vec2 of(Vec2 actin_um) const;
   /// More than chance makes of images that lie on each other.
   bool is_significant() const;

@@ -451,10 +451,4 @@ std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhes
   return fibres;
 }
 
-std::vector<Fibre> find_fibres(const images::Image& image, const Polygon& outline_um,
-                               const std::vector<Adhesion>& adhesions, double pixel_size_um, const FibreParameters& p,
-                               const Cuts& cuts) {
-  return tied(trace_fibres(image, outline_um, pixel_size_um, p).fibres, adhesions, outline_um, p, cuts);
-}
-
 }  // namespace mbtfm::cells

@@ -44,14 +44,10 @@ struct TracedLines {
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
-/// out. @param cuts  of the outline: see lead_to_cut()
+/// out. A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
+/// `mean_intensity` the mean height above both sides in grey levels.
+/// @param cuts  of the outline: see lead_to_cut()
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
                         const Polygon& outline_um, const FibreParameters& parameters, const Cuts& cuts = {});
-
-/// Both. A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
-/// `mean_intensity` the mean height above both sides in grey levels.
-std::vector<Fibre> find_fibres(const images::Image& image, const Polygon& outline_um,
-                               const std::vector<Adhesion>& adhesions, double pixel_size_um,
-                               const FibreParameters& parameters, const Cuts& cuts = {});
 
 }  // namespace mbtfm::cells

@@ -283,10 +283,4 @@ CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>&
   return is_better ? second : first;
 }
 
-Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
-                     const OutlineParameters& p) {
-  const auto cells = find_cells(image, adhesions, pixel_size_um, p).cells;
-  return cells.empty() ? Polygon{} : cells.front().outer_um;
-}
-
 }  // namespace mbtfm::cells

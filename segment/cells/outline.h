@@ -77,10 +77,6 @@ struct CellsInImage {
 CellsInImage find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                         const OutlineParameters& parameters);
 
-/// The largest cell's outer ring; empty where there is no cell.
-Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
-                     const OutlineParameters& parameters);
-
 /// Share of a cell's area that lies more than `far_um` beyond all of the others.
 double share_beyond(const CellOutline& cell, const std::vector<CellOutline>& others, double far_um);
 

@@ -25,8 +25,6 @@ constexpr int kPieces = kPiecesPerUnit * static_cast<int>(LayerTable::kReach);
 
 }  // namespace
 
-double layer_vertical_factor(double nu, double x) { return 0.5 * (1 - 2 * nu) + base_down_by_along(nu, x); }
-
 LayerVertical::LayerVertical(const Gel& gel) : gel_(gel), values_(kPieces * kNodes) {
   constexpr int kPanels = 48;  // of 1/2 with 20 Gauss points, as the layer's other transforms
   const numerics::GaussRule gauss = numerics::gauss_legendre(20);

@@ -15,9 +15,6 @@
 
 namespace mbtfm::greens {
 
-/// w(x), x = kh > 0. Tends to (1-2nu)/2, the half-space's.
-double layer_vertical_factor(double poisson_ratio, double x);
-
 class LayerVertical {
  public:
   explicit LayerVertical(const Gel& gel);

@@ -21,7 +21,6 @@ class Height {
   Vec2 slope(Vec2 at_um) const;
   /// Whether a place lies within the map, but for rounding.
   bool contains(Vec2 at_um) const;
-  double mean_um() const { return mean_um_; }
   Vec2 low_um() const { return lattice_.corner_um; }
   Vec2 high_um() const { return at_place(lattice_, {1.0 * lattice_.n_x, 1.0 * lattice_.n_y}); }
 

@@ -1,6 +1,6 @@
 /// Drawn fibres are found where they were drawn, each as one, of the right width and type.
-#include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/find_fibres.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::cells {
@@ -182,7 +182,7 @@ TEST(Fibres, the_edge_of_a_cell_is_its_outline_and_no_fibre) {
   const Adhesion cell = ellipse(1, {12.8, 12.8}, 20, 16, 0.3);
   draw_ellipse(image, cell, 300, 0.15, 0.1);
   add_noise(image, 10, 4);
-  const Polygon outline = find_outline(image, {}, 0.1, OutlineParameters{});
+  const Polygon outline = find_cells(image, {}, 0.1, OutlineParameters{}).cells.at(0).outer_um;
   ASSERT_GE(outline.size(), 8u);
   // an error of half a pixel all around (57 um) would be 2.8 um² of 251
   EXPECT_GT(intersection_over_union(outline, ellipse_corners(cell, 200)), 0.97);

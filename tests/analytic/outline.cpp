@@ -29,7 +29,7 @@ double mean_offset_um(const Polygon& ring, const Adhesion& ellipse) {
 TEST(Outline, lies_on_a_blurred_step) {
   for (const double noise : {2.0, 10.0, 40.0}) {
     SCOPED_TRACE(noise);
-    const Polygon outline = find_outline(drawn_disc(noise, 1), {}, kPixel_um, {});
+    const Polygon outline = find_cells(drawn_disc(noise, 1), {}, kPixel_um, {}).cells.at(0).outer_um;
     ASSERT_GE(outline.size(), 8u);
     EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.05);
     EXPECT_GT(intersection_over_union(outline, ellipse_corners(kDisc, 200)), 0.98);
@@ -43,7 +43,7 @@ TEST(Outline, lies_in_the_middle_of_a_cortex_that_the_microscope_cannot_resolve)
     Polyline edge = ellipse_corners(kDisc, 100);
     edge.push_back(edge.front());
     draw_line(image, edge, 300, width_um, kPixel_um);
-    const Polygon outline = find_outline(image, {}, kPixel_um, {});
+    const Polygon outline = find_cells(image, {}, kPixel_um, {}).cells.at(0).outer_um;
     EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.1);  // its half-height is 0.2 and 0.3 um further out
     EXPECT_GT(intersection_over_union(outline, ellipse_corners(kDisc, 200)), 0.98);
   }
@@ -59,7 +59,7 @@ TEST(Outline, lies_on_the_edge_of_a_cell_and_not_of_its_haze) {
     draw_ellipse(image, cell, 200, 6, kPixel_um);
     draw_line(image, {{20, 28}, {40, 31}}, 400, 0.6, kPixel_um);
     add_noise(image, noise, 6);
-    const Polygon outline = find_outline(image, {}, kPixel_um, {});
+    const Polygon outline = find_cells(image, {}, kPixel_um, {}).cells.at(0).outer_um;
     // the step of the mask's grid, and what the median of a curved cell lacks of its plateau
     EXPECT_NEAR(mean_offset_um(outline, cell), 0, 0.5);
     EXPECT_GT(intersection_over_union(outline, ellipse_corners(cell, 200)), 0.93);
@@ -72,7 +72,7 @@ TEST(Outline, keeps_a_dim_lamella_whose_edge_is_sharp) {
   draw_ellipse(image, lamella, 100, 0.15, kPixel_um);
   draw_ellipse(image, body, 200, 0.5, kPixel_um);  // three times as bright
   add_noise(image, 5, 7);
-  const Polygon outline = find_outline(image, {}, kPixel_um, {});
+  const Polygon outline = find_cells(image, {}, kPixel_um, {}).cells.at(0).outer_um;
   EXPECT_GT(intersection_over_union(outline, ellipse_corners(lamella, 200)), 0.95);  // 0.75 is the body
 }
 

@@ -11,10 +11,10 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105384;
+constexpr int kLinesOfProduct = 105368;
 constexpr int kLinesOfTests = 45622;
-constexpr int kLongSources = 9;                                                   // .cpp of the product above 400 lines
-constexpr int kLongestSource = 570;                                               // lines
+constexpr int kLongSources = 6;                                                   // .cpp of the product above 400 lines
+constexpr int kLongestSource = 496;                                               // lines
 constexpr int kOwnHeadersMedian = 17, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
 constexpr int kSeeFindings = 35;  // sources of product and tests that a new kind of finding compiles again
 constexpr int kKindsOfFindings = 55;

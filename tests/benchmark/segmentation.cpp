@@ -1,5 +1,6 @@
 #include <benchmark/benchmark.h>
 
+#include "tests/support/find_fibres.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace {
@@ -33,7 +34,7 @@ void adhesions(benchmark::State& state) {
 
 void outline(benchmark::State& state) {
   const auto& cell = cell_of(static_cast<int>(state.range(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(cells::find_outline(cell.actin.image, {}, 0.1, {}));
+  for (auto _ : state) benchmark::DoNotOptimize(cells::find_cells(cell.actin.image, {}, 0.1, {}));
   state.SetComplexityN(state.range(0) * state.range(0));
 }
 

@@ -1,7 +1,7 @@
 /// What `refined` promises beyond convergence: the error it reports, layered gels, symmetries, the gel's inside.
 #include "substrate/choice/factory.h"
+#include "substrate/greens/inside.h"
 #include "substrate/greens/layer.h"
-#include "substrate/greens/layer_vertical.h"
 #include "substrate/greens/models.h"
 #include "substrate/material.h"
 #include "tests/support/layered_gel.h"
@@ -208,8 +208,9 @@ TEST(Vertical, of_layer_and_split_agree) {
 
 TEST(Vertical, of_a_thick_layer_is_that_of_the_half_space) {
   for (const double nu : {0.0, 0.3, 0.4999}) {
-    EXPECT_NEAR(greens::layer_vertical_factor(nu, 30), 0.5 * (1 - 2 * nu), 1e-12);
-    EXPECT_NEAR(greens::layer_vertical_factor(nu, 0.01), 0, 1e-4);  // long waves shear the layer: as (kh)²
+    EXPECT_NEAR(greens::base_down_by_along(nu, 30), 0, 1e-12);
+    // long waves shear the layer and move its surface as (kh)²: the base takes the half-space's motion away
+    EXPECT_NEAR(greens::base_down_by_along(nu, 0.01), -0.5 * (1 - 2 * nu), 1e-4);
   }
   const std::vector<Vec2> points = {{1, 0.5}, {3, -2}};
   const std::vector<Ellipse> ellipses = {{{0, 0}, 1, 0.5, 0.3}};

@@ -20,7 +20,7 @@ struct Found {
 
 Found found_in(const Image& adhesion, const Image& actin) {
   const auto adhesions = cells::find_adhesions(adhesion, kPixel_um, {});
-  return {adhesions, cells::find_outline(actin, adhesions, kPixel_um, {})};
+  return {adhesions, cells::find_cells(actin, adhesions, kPixel_um, {}).cells.at(0).outer_um};
 }
 
 /// `b` is `a` after `move`, a turn by `turn_rad` or a reflection.

@@ -13,10 +13,7 @@ namespace {
 using test::TensionScene;
 
 Cell cell_of_three_fibres() {
-  Cell cell = test::round_cell(14, 12);
-  test::add_ventral(cell, 1, 6);
-  test::add_ventral(cell, 3, 9);
-  test::add_ventral(cell, 4, 11);
+  Cell cell = test::round_cell(14, 12, {{1, 6}, {3, 9}, {4, 11}});
   return cell;
 }
 

@@ -57,8 +57,7 @@ Eigen::VectorXd answers(const Fitted& f, const Eigen::VectorXd& displacement_um)
 }
 
 TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
-  Cell cell = test::round_cell(14, 16);
-  for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
+  Cell cell = test::round_cell(14, 16, {{1, 9}, {3, 12}, {5, 15}});
   Fitted f{test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.05, 7), {}, {}};
   for (std::uint64_t seed = 11; seed < 15; ++seed)
     f.networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
@@ -154,8 +153,7 @@ TEST(ErrorBudget, gives_the_bias_of_a_substrate_that_lacks_the_base) {
 /// A fit that is stopped early is off by what was left to go. (Near a bound the part is larger than that: it takes the
 /// whole step, which the bound would have cut.)
 TEST(ErrorBudget, shows_what_a_fit_that_stops_early_leaves_undone) {
-  Cell cell = test::round_cell(14, 16);
-  for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
+  Cell cell = test::round_cell(14, 16, {{1, 9}, {3, 12}, {5, 15}});
   const auto scene = [&] { return test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.02, 7); };
   TensionScene whole = scene();
   const Eigen::VectorXd end = test::values_of(test::fit_own_network(whole, {.loss = Loss::squares}));

@@ -1,6 +1,6 @@
 /// What must not change the fibres of an image, or change them in a known way.
-#include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/find_fibres.h"
 
 namespace mbtfm::beads {
 namespace {

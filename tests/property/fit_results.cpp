@@ -10,8 +10,7 @@ namespace mbtfm::tensions {
 namespace {
 
 TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
-  Cell cell = test::round_cell(14, 16);
-  for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
+  Cell cell = test::round_cell(14, 16, {{1, 9}, {3, 12}, {5, 15}});
   test::TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 4000, 0.1, 7);
   const EnsembleFit fit = test::fit_own_network(scene);
   const FitSummary summary = summary_of(fit, {.cell = cell, .beads = scene.beads}, 0.5, {});
@@ -22,8 +21,7 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
 }
 
 TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_another) {
-  Cell cell = test::round_cell(14, 24);
-  for (const auto& [a, b] : {std::pair{1, 13}, {4, 18}, {7, 22}}) test::add_ventral(cell, a, b);
+  Cell cell = test::round_cell(14, 24, {{1, 13}, {4, 18}, {7, 22}});
   double stated = 0, left = 0, of_network = 0;
   int n = 0;
   for (std::uint64_t seed = 5; seed < 8; ++seed) {

@@ -26,8 +26,7 @@ Case of_reference(const std::string& name, double noise, unsigned seed) {
 
 /// A ring of adhesions with crossing fibres, of which every other one is slack in truth: many end at the bound.
 Case of_round_cell(int n_meshes, double noise, unsigned seed) {
-  Cell cell = test::round_cell(15, 12);
-  for (const auto& [a, b] : {std::pair{1, 6}, {2, 7}, {3, 10}, {4, 9}, {5, 12}, {8, 11}}) test::add_ventral(cell, a, b);
+  Cell cell = test::round_cell(15, 12, {{1, 6}, {2, 7}, {3, 10}, {4, 9}, {5, 12}, {8, 11}});
   Eigen::VectorXd tensions = test::thesis_tensions_nN(cell.fibres.size(), seed);
   for (Eigen::Index i = 1; i < tensions.size(); i += 2) tensions[i] = 0;
   Case c{std::to_string(n_meshes) + " meshes, noise " + std::to_string(noise) + ", seed " + std::to_string(seed),

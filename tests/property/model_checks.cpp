@@ -12,8 +12,7 @@ namespace {
 
 /// One fibre, pulling with this.
 test::TensionScene one_fibre(double tension_nN, int n_beads) {
-  Cell cell = test::round_cell(8, 6);
-  test::add_ventral(cell, 1, 4);
+  Cell cell = test::round_cell(8, 6, {{1, 4}});
   return test::scene_of(cell, Eigen::Vector2d(0.3, tension_nN), n_beads, 0.02, 3);
 }
 

@@ -40,9 +40,7 @@ struct ShiftedCell {
 };
 
 ShiftedCell shifted_cell(Vec2 shift_um, double turn_rad, double noise, unsigned seed) {
-  Cell cell = test::round_cell(12, 9);
-  test::add_ventral(cell, 1, 5);
-  test::add_ventral(cell, 2, 7);
+  Cell cell = test::round_cell(12, 9, {{1, 5}, {2, 7}});
   ShiftedCell result{.cell = cell,
                      .scene = test::scene_of(cell, Eigen::Vector3d(0.1, 6, 3), 900, noise, 5),
                      .truth = {.centre_um = {30, 30}, .shift_um = shift_um, .turn_rad = turn_rad}};

@@ -421,10 +421,7 @@ TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
 }
 
 TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_is_the_best) {
-  Cell cell = test::round_cell(15, 16);
-  test::add_ventral(cell, 1, 7);
-  test::add_ventral(cell, 3, 12);
-  test::add_ventral(cell, 5, 14);
+  Cell cell = test::round_cell(15, 16, {{1, 7}, {3, 12}, {5, 14}});
   TensionScene whole = test::scene_of(cell, Eigen::Vector4d(0.06, 4, 5, 6), 3000, 0.05, 10);
   const EnsembleFit fit = fit_own_network(whole);
   for (const MissingFibre& f : missing_fibres(fit, cell.adhesions)) {
@@ -467,10 +464,7 @@ TEST(ModelChecks, the_odds_of_a_fibre_are_those_of_its_integral) {
 }
 
 TEST(ModelChecks, a_line_that_does_not_pull_is_no_fibre_unless_the_image_is_sure) {
-  Cell cell = test::round_cell(15, 16);
-  test::add_ventral(cell, 1, 7);
-  test::add_ventral(cell, 3, 12);
-  test::add_ventral(cell, 5, 14);
+  Cell cell = test::round_cell(15, 16, {{1, 7}, {3, 12}, {5, 14}});
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 0, 5, 6), 3000, 0.05, 10);
   const EnsembleFit fit = fit_own_network(scene);
   for (Fibre& fibre : cell.fibres) fibre.confidence = 0.6;
@@ -487,8 +481,7 @@ TEST(ModelChecks, a_line_that_does_not_pull_is_no_fibre_unless_the_image_is_sure
 TEST(ModelChecks, missing_fibres_that_cross_have_their_own_ends) {
   for (const auto& [second_start, second_end] : {std::pair{4, 13}, {4, 11}, {2, 13}}) {
     SCOPED_TRACE(second_start);
-    Cell cell = test::round_cell(15, 16);
-    test::add_ventral(cell, 1, 7);
+    Cell cell = test::round_cell(15, 16, {{1, 7}});
     // large adhesions hardly move the gel: beads tell them less well, and the pair of the two small ones stands out
     for (const int large : {12, second_start}) {
       Adhesion& a = cell.adhesions[large - 1];
@@ -516,8 +509,7 @@ TEST(ModelChecks, missing_fibres_that_cross_have_their_own_ends) {
 }
 
 TEST(ModelChecks, fewer_fibres_are_called_for_at_strong_adhesions_where_errors_of_the_segmentation_are_counted) {
-  Cell cell = test::round_cell(15, 16);
-  for (const auto& [a, b] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, a, b);
+  Cell cell = test::round_cell(15, 16, {{1, 7}, {3, 12}, {5, 14}});
   const SegmentationErrors stated{.adhesion_shift_error_um = 0.05, .adhesion_area_error = 0.3};  // of poor images
   std::size_t n_told = 0, n_if_exact = 0;
   for (std::uint64_t seed = 1; seed <= 16; ++seed) {
@@ -549,8 +541,7 @@ TEST(ModelChecks, fewer_fibres_are_called_for_at_strong_adhesions_where_errors_o
 }
 
 TEST(ModelChecks, tensions_drawn_by_type_explain_the_beads_better_than_with_types_exchanged) {
-  Cell cell = test::round_cell(15, 16);
-  for (const auto& [start, end] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, start, end);
+  Cell cell = test::round_cell(15, 16, {{1, 7}, {3, 12}, {5, 14}});
   for (const int start : {2, 8, 11}) {
     test::add_ventral(cell, start, start);
     Fibre& f = cell.fibres.back();

@@ -36,9 +36,7 @@ struct PullingCell {
 
 /// @param share  of tensions that move the gel by more than an adhesion's radius
 PullingCell pulling_cell(double share, double noise, unsigned seed) {
-  Cell cell = test::round_cell(12, 9);
-  test::add_ventral(cell, 1, 5);
-  test::add_ventral(cell, 2, 7);
+  Cell cell = test::round_cell(12, 9, {{1, 5}, {2, 7}});
   PullingCell result{.cell = cell,
                      .scene = test::scene_of(cell, share * Eigen::Vector3d(0.2, 16, 8), 900, noise, seed)};
   result.at_rest = result.scene.beads;

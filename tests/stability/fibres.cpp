@@ -1,8 +1,8 @@
 /// Actin images without fibres give none; what looks like fibres but is not is left out.
 #include <opencv2/core.hpp>
 
-#include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/find_fibres.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::cells {

@@ -1,5 +1,6 @@
 /// Fibres in images that no one here made, where they are at hand (../shared/data); skipped elsewhere.
 #include "segment/cells/segment_cell.h"
+#include "tests/support/find_fibres.h"
 #include "tests/support/folders.h"
 #include "tests/support/segmentation_score.h"
 

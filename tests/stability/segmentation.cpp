@@ -3,6 +3,7 @@
 #include "pipeline/contract/extent.h"
 #include "pipeline/contract/kinds_of_findings.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/find_fibres.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::cells {
@@ -13,7 +14,7 @@ using namespace mbtfm::test;
 void expect_nothing(const images::Image& image, double pixel_um = 0.1) {
   EXPECT_TRUE(find_adhesions(image, pixel_um, AdhesionParameters{}).empty());
   EXPECT_TRUE(find_fibres(image, {}, {}, pixel_um, FibreParameters{}).empty());
-  EXPECT_TRUE(find_outline(image, {}, pixel_um, OutlineParameters{}).empty());
+  EXPECT_TRUE(find_cells(image, {}, pixel_um, {}).cells.empty());
 }
 
 TEST(Segmentation, finds_nothing_in_a_constant_image) {

@@ -62,9 +62,7 @@ TEST(TensionFitHard, beads_all_beside_the_cell_are_refused_with_their_place) {
 }
 
 TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
-  Cell cell = test::round_cell(12, 12);
-  test::add_ventral(cell, 1, 7);
-  test::add_ventral(cell, 3, 9);
+  Cell cell = test::round_cell(12, 12, {{1, 7}, {3, 9}});
   Fibre beside = cell.fibres[0];  // away from the others, with free ends
   for (Vec2& p : beside.points_um) p = Vec2{30 + 0.4 * (p.x - 30), 36};
   beside.type = FibreType::arc;

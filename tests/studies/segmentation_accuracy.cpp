@@ -11,6 +11,7 @@
 #include <cstdlib>
 
 #include "pipeline/contract/errors.h"
+#include "tests/support/find_fibres.h"
 #include "tests/support/real_adhesions.h"
 #include "tests/support/segmentation_accuracy.h"
 #include "tests/support/settings.h"

@@ -181,7 +181,8 @@ inline double mask_overlap(const images::Image& mask, const Polygon& outline_um,
 }
 
 inline double doublet_overlap() {
-  const Polygon outline = cells::find_outline(images::read_image(kDoublet / "actin.tif"), {}, kDoubletPixel_um, {});
+  const Polygon outline =
+      cells::find_cells(images::read_image(kDoublet / "actin.tif"), {}, kDoubletPixel_um, {}).cells.at(0).outer_um;
   return mask_overlap(images::read_image(kDoublet / "mask.tif"), outline, kDoubletPixel_um);
 }
 

@@ -112,8 +112,22 @@ inline TensionScene tension_scene(const std::string& name, int n_beads, double n
   return scene;
 }
 
-/// A round cell with a ring of adhesions at its edge, numbered from +x towards +y.
-inline Cell round_cell(double radius_um, int n_adhesions) {
+/// A straight ventral fibre between two of a cell's adhesions.
+inline void add_ventral(Cell& cell, int start_id, int end_id) {
+  Fibre f;
+  f.fibre_id = static_cast<int>(cell.fibres.size()) + 1;
+  f.type = FibreType::ventral;
+  f.width_um = 0.6;
+  f.mean_intensity = 1;
+  f.start_adhesion_id = start_id;
+  f.end_adhesion_id = end_id;
+  f.points_um = {cell.adhesions[static_cast<std::size_t>(start_id) - 1].position_um,
+                 cell.adhesions[static_cast<std::size_t>(end_id) - 1].position_um};
+  cell.fibres.push_back(f);
+}
+
+/// A round cell with a ring of adhesions at its edge, numbered from +x towards +y, and ventral fibres between them.
+inline Cell round_cell(double radius_um, int n_adhesions, std::initializer_list<std::pair<int, int>> ventral = {}) {
   Cell cell;
   for (int i = 0; i < 90; ++i) {
     const double angle = 2 * std::numbers::pi * i / 90;
@@ -129,21 +143,8 @@ inline Cell round_cell(double radius_um, int n_adhesions) {
     a.mean_intensity = 1;
     cell.adhesions.push_back(a);
   }
+  for (const auto& [start, end] : ventral) add_ventral(cell, start, end);
   return cell;
-}
-
-/// A straight ventral fibre between two of a cell's adhesions.
-inline void add_ventral(Cell& cell, int start_id, int end_id) {
-  Fibre f;
-  f.fibre_id = static_cast<int>(cell.fibres.size()) + 1;
-  f.type = FibreType::ventral;
-  f.width_um = 0.6;
-  f.mean_intensity = 1;
-  f.start_adhesion_id = start_id;
-  f.end_adhesion_id = end_id;
-  f.points_um = {cell.adhesions[static_cast<std::size_t>(start_id) - 1].position_um,
-                 cell.adhesions[static_cast<std::size_t>(end_id) - 1].position_um};
-  cell.fibres.push_back(f);
 }
 
 /// As the thesis has it: link values along edges only, adhesions at points.

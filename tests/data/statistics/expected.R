@@ -97,20 +97,23 @@ for (i in 1:3) {
 }
 
 # The clustered rank-sum test, by its definition: the rank sum over all ways to draw one fibre from each cell, here its
-# mean (Datta & Satten 2005, eq. 2), for ventral against dorsal fibres; no package of Debian has it.
+# mean (Datta & Satten 2005, eq. 2), for ventral against dorsal fibres, over the scatter of the cells' contributions
+# (eq. 5); no package of Debian has it. Of two groups Hotelling's T² is F.
 two <- subset(fibres, type != "arc"); two$cell <- factor(as.character(two$cell))
 share <- function(values, x) (mean(values <= x) + mean(values < x)) / 2
-M <- nlevels(two$cell); s <- 0; mean_s <- 0
+M <- nlevels(two$cell); s <- 0; mean_s <- 0; w <- c()
+ventral <- sapply(levels(two$cell), function(i) mean(two$type[two$cell == i] == "ventral"))
 for (i in levels(two$cell)) {
-  here <- two[two$cell == i, ]
-  for (k in seq_len(nrow(here))) if (here$type[k] == "ventral") {
-    others <- setdiff(levels(two$cell), i)
-    rank <- 1 + sum(sapply(others, function(j) share(two$tension_nN[two$cell == j], here$tension_nN[k])))
-    s <- s + rank / nrow(here) / (M + 1)
+  here <- two[two$cell == i, ]; others <- setdiff(levels(two$cell), i); w_i <- -M / (M + 1) * (ventral[i] - mean(ventral)) / 2
+  for (k in seq_len(nrow(here))) {
+    is_ventral <- here$type[k] == "ventral"
+    shares <- sapply(levels(two$cell), function(j) share(two$tension_nN[two$cell == j], here$tension_nN[k]))
+    if (is_ventral) s <- s + (1 + sum(shares[others])) / nrow(here) / (M + 1)
+    w_i <- w_i + ((M - 1) * is_ventral - sum(ventral[others])) * mean(shares) / nrow(here) / (M + 1)
   }
-  mean_s <- mean_s + mean(here$type == "ventral") / 2
+  w <- c(w, w_i); mean_s <- mean_s + ventral[i] / 2
 }
-say("clustered.s", s); say("clustered.expected", mean_s)
+say("clustered.f", (s - mean_s)^2 / (M * var(w)))
 
 expected$value <- signif(expected$value, 10)
 write.csv(expected, "expected.csv", row.names = FALSE, quote = FALSE)
