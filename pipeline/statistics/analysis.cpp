@@ -73,7 +73,7 @@ void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   const auto n = std::ranges::count_if(study.cells, [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
   warnings.push_back(
-      report::sentence("study.warn-network-unresolved", n, counted(n_of_kind(study, CellKind::plane), "cells")));
+      report::sentence("study.warn-network-unresolved", n, counted(n_with_fibres(study), "cells")));
 }
 
 /// What the beads do not limit to both sides.
@@ -181,7 +181,7 @@ PrimaryChoice primary_choice(const Study& study, const Analysis& analysis, const
 Analysis analyse(const Study& study, const StudyParameters& parameters) {
   const std::vector<CellWeights> draws = draw_cells(study, parameters);
   Analysis a;
-  a.has_fibres = n_of_kind(study, CellKind::plane) > 0;
+  a.has_fibres = n_with_fibres(study) > 0;
   for (Sample& sample : samples_of(study)) a.measures.push_back(measure(std::move(sample), draws));
   a.tensions_by_cell = summarise_by_cell(a.tensions().sample, study);
   a.shares = shares_above(a.tensions().sample, thresholds_nN(parameters));

@@ -200,7 +200,7 @@ Sample sample_of(const Study& study, const MeasureRow& row) {
 }  // namespace
 
 std::vector<Sample> samples_of(const Study& study) {
-  const bool of_fibres = n_of_kind(study, CellKind::plane) > 0;
+  const bool of_fibres = n_with_fibres(study) > 0;
   std::vector<Sample> samples;
   for (const MeasureRow& row : measure_table(study.n_fibre_types)) {
     Sample sample = sample_of(study, row);

@@ -251,6 +251,10 @@ int n_of_kind(const Study& study, CellKind kind) {
   return static_cast<int>(std::ranges::count_if(study.cells, [&](const StudyCell& c) { return c.kind() == kind; }));
 }
 
+int n_with_fibres(const Study& study) {
+  return static_cast<int>(std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_fibres(c.kind()); }));
+}
+
 const KindInStudy& in_study(CellKind kind) {
   static const std::array<KindInStudy, 3> all = {
       {{"cell",

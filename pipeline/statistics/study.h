@@ -131,6 +131,8 @@ const std::string& condition_of(const Study& study, const StudyCell& cell);
 FibreType counted_type(const Study& study, FibreType type);
 
 int n_of_kind(const Study& study, CellKind kind);
+/// Those that have fibres.
+int n_with_fibres(const Study& study);
 
 /// What a study has to know of a kind of cells.
 struct KindInStudy {

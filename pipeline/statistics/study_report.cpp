@@ -150,7 +150,7 @@ std::string overview(const Study& study, const Analysis& analysis) {
         std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
   }
   std::string html = "<p>";
-  if (const int n = n_of_kind(study, CellKind::plane); n > 0)
+  if (const int n = n_with_fibres(study); n > 0)
     html += report::sentence("study.cells-with-fibres", counted(n, "cells"), counted(n_adhesions, "adhesions"),
                              counted(n_fibres, "stress fibres"), analysis.tensions().sample.values.size()) +
             " ";
