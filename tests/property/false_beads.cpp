@@ -10,7 +10,6 @@ constexpr double kNoise = 0.2;  // px
 struct Field {
   Scene scene;
   std::vector<Track> tracks;
-  int nearest_to(Vec2 place) const { return scene.relaxed->neighbours.within(place, 100, 1).front(); }
 };
 
 /// Beads 11 px apart, as 0.8 of them on a um² at 0.1 um by pixel, that follow these peaks, each with noise of its own.

@@ -1,4 +1,4 @@
-/// Image correlation in windows, for comparison: what it does itself, and what it would make of tracked beads.
+/// Image correlation in windows, for comparison.
 #pragma once
 
 #include "segment/beads/coarse_field.h"
@@ -11,39 +11,6 @@ namespace mbtfm::test {
 struct Moved {
   Vec2 place, u;
 };
-
-/// Share of a Gaussian picture at `apart` from the middle of a stretch that lies in it.
-inline double share_within(double apart, double half, double sigma) {
-  const double scale = 1 / (std::sqrt(2.0) * sigma);
-  return 0.5 * (std::erf(scale * (apart + half)) - std::erf(scale * (apart - half)));
-}
-
-/// Image correlation in a square window of `side` px sees what most of its beads do: the mode of their displacements,
-/// each with the share of its picture that the window holds in both images and the product of its light in both, as
-/// wide as the correlation of two beads.
-inline Vec2 as_correlation_sees(const std::vector<Moved>& beads, Vec2 middle, double bead_sigma_px, int side) {
-  std::vector<double> shares;
-  for (const Moved& bead : beads) {
-    const Vec2 d = bead.place - middle;
-    shares.push_back(share_within(d.x, 0.5 * side, bead_sigma_px) * share_within(d.y, 0.5 * side, bead_sigma_px));
-  }
-  Vec2 mode;
-  for (int step = 0; step < 30; ++step) {
-    const double width = step < 3 ? 4 : std::sqrt(2.0) * bead_sigma_px;
-    double weights = 0;
-    Vec2 sum;
-    for (std::size_t k = 0; k < beads.size(); ++k) {
-      if (shares[k] <= 0) continue;
-      const Vec2 apart = beads[k].u - mode;
-      const double weight = shares[k] * std::exp(-dot(apart, apart) / (2 * width * width));
-      weights += weight;
-      sum += weight * beads[k].u;
-    }
-    if (!(weights > 0)) break;
-    mode = (1 / weights) * sum;
-  }
-  return mode;
-}
 
 /// A published grid's place less the middle of its window: PIVlab counts pixels from 1, and a window of an even number
 /// of them begins half its side before its place.
