@@ -11,8 +11,8 @@
 namespace mbtfm {
 namespace {
 
-constexpr int kLinesOfProduct = 105368;
-constexpr int kLinesOfTests = 45622;
+constexpr int kLinesOfProduct = 105357;
+constexpr int kLinesOfTests = 45616;
 constexpr int kLongSources = 6;                                                   // .cpp of the product above 400 lines
 constexpr int kLongestSource = 496;                                               // lines
 constexpr int kOwnHeadersMedian = 17, kOwnHeadersP90 = 42, kOwnHeadersMost = 90;  // that a source of the product gets
