@@ -72,8 +72,7 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
 void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
   const auto n = std::ranges::count_if(study.cells, [](const StudyCell& cell) { return !is_network_known(cell); });
   if (n == 0) return;
-  warnings.push_back(
-      report::sentence("study.warn-network-unresolved", n, counted(n_with_fibres(study), "cells")));
+  warnings.push_back(report::sentence("study.warn-network-unresolved", n, counted(n_with_fibres(study), "cells")));
 }
 
 /// What the beads do not limit to both sides.
