@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Install the missing Debian packages (12 or 13) that mbtfm builds with, as root or through sudo; says what is missing if it
-# can do neither. First argument: cell (what a cell needs, from images to its report), all (all programs) or tests; then
-# further packages.
+# can do neither. First argument: cell (what a cell needs, from images to its report), all (all programs and tests) or
+# tests (what these ask for in addition); then further packages.
 set -euo pipefail
 
 purpose=${1:-all}
@@ -16,8 +16,8 @@ packages=(
   libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libpugixml-dev libssl-dev
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev libutf8proc-dev
 )
-[ "$purpose" = cell ] || packages+=(libdeal.ii-dev zlib1g-dev librsvg2-dev pkg-config fonts-dejavu-core)
-[ "$purpose" != tests ] || packages+=(libgtest-dev libgmock-dev python3-jsonschema)
+[ "$purpose" = cell ] || packages+=(libdeal.ii-dev zlib1g-dev librsvg2-dev pkg-config fonts-dejavu-core libgtest-dev libgmock-dev)
+[ "$purpose" != tests ] || packages+=(python3-jsonschema)
 packages+=("$@")
 
 missing=()
