@@ -68,7 +68,9 @@ Ghosts median_share(std::vector<std::pair<double, double>> shares, bool is_relax
 
 Ghosts ghosts_of(const Scene& scene, const std::vector<Track>& tracks, const BeadSizes& sizes,
                  const std::optional<Turn>& turn) {
-  constexpr double kNear = 0.5;  // bead sigmas: within it a bead and its ghost are one
+  constexpr double kNear = 0.5;    // bead sigmas: within it a bead and its ghost are one
+  constexpr double kAlike = 1.25;  // the wings of beads far out of focus read as ghosts of up to 0.10
+  if (std::max(sizes.ratio, 1 / sizes.ratio) > kAlike) return {};
   const double of_relaxed_px = scene.bead_sigma(), of_stressed_px = sizes.ratio * of_relaxed_px;
   const Plane &relaxed = scene.relaxed->image.plane, &stressed = scene.stressed.image.plane;
   const auto in = [&](bool is_relaxed) {

@@ -140,7 +140,7 @@ struct BeadSizes {
 /// How much of one picture's light shines in the other one, as where a camera keeps an image or frames were averaged.
 struct Ghosts {
   double share = 0;        ///< of a bead's height; the larger of both pictures'
-  double sigma = 0;        ///< its standard error; 0: not known
+  double sigma = 0;        ///< its standard error; 0: not known, as where one picture is out of focus
   bool is_relaxed = true;  ///< the picture that shows the other's beads, too
 };
 
