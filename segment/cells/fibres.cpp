@@ -280,7 +280,8 @@ Rest rest_of(const std::vector<Candidate>& fibres, const Judge& judge) {
 }
 
 /// Also the fainter ones, which brighter ones beside or across them hide; and the lines that are none.
-Judged with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
+/// @param hidden  judges by the rest
+Judged with_hidden(std::vector<Candidate> fibres, const Judge& hidden, const Judge& judge) {
   std::vector<Trace> known;
   std::vector<double> heights;
   for (const Candidate& c : fibres) {
@@ -288,8 +289,7 @@ Judged with_hidden(std::vector<Candidate> fibres, const Rest& rest, const Judge&
     heights.push_back(c.profile.height);
   }
   const double faint = judge.p.fibre_faintest * numerics::quantile(std::move(heights), 0.5);
-  const Judge hidden{rest.field, rest.ridges, judge.rule, judge.outline_um, judge.texture, judge.p};
-  for (const Trace& trace : trace_lines(rest.ridges, rest.field.is_inside, judge.rule, known)) {
+  for (const Trace& trace : trace_lines(hidden.ridges, hidden.field.is_inside, judge.rule, known)) {
     auto c = hidden.candidate(trace, judge.p.fibre_edge_um);
     if (c && c->profile.height >= faint) fibres.push_back(std::move(*c));
   }
@@ -337,19 +337,18 @@ Judged with_probable(Judged lines, const Judge& judge) {
 }
 
 /// Put right where fibres cross, and put together where their pieces lie far apart.
-std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Rest& rest, const Judge& judge) {
+std::vector<Candidate> regrouped(std::vector<Candidate> fibres, const Judge& hidden, const Judge& judge) {
   std::vector<Trace> traces;
   for (const Candidate& c : fibres) traces.push_back(c.trace);
   traces = with_own_courses(std::move(traces), judge.ridges, judge.rule);
-  const Judge hidden{rest.field, rest.ridges, judge.rule, judge.outline_um, judge.texture, judge.p};
   std::vector<Candidate> result;
   const auto keep = [&](const Trace& trace) {
     auto c = judge.candidate(trace, 0);
-    if (!c) c = hidden.candidate(trace, 0);  // beside a brighter line it falls on one side only
+    if (!c) c = hidden.candidate(trace, 0);  // a brighter line beside it hides it
     if (c) result.push_back(std::move(*c));
     return c.has_value();
   };
-  for (const BridgedLine& line : bridged(traces, rest.ridges, judge.rule))
+  for (const BridgedLine& line : bridged(traces, hidden.ridges, judge.rule))
     if (!keep(line.trace))
       for (const std::size_t i : line.pieces) keep(traces[i]);
   return result;
@@ -410,8 +409,9 @@ TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, 
   Judged lines{judged(traces, judge), {}};
   if (!lines.fibres.empty()) {
     const Rest rest = rest_of(lines.fibres, judge);
-    lines = with_probable(with_hidden(std::move(lines.fibres), rest, judge), judge);
-    lines.fibres = regrouped(std::move(lines.fibres), rest, judge);
+    const Judge hidden{rest.field, rest.ridges, rule, outline_um, judge.texture, p};
+    lines = with_probable(with_hidden(std::move(lines.fibres), hidden, judge), judge);
+    lines.fibres = regrouped(std::move(lines.fibres), hidden, judge);
     lines = with_probable(std::move(lines), judge);
     look_beyond(lines.fibres, rest, rule);
   }
