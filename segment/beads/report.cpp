@@ -101,6 +101,8 @@ void notice_images(const Tracking& tracking, stage::StageContext& context) {
                (sizes.is_of_pixels ? ", by pixels that are not square" : ""),
          .severity = sizes.is_of_pixels ? Severity::caution : Severity::note}));
   }
+  if (const Ghosts& g = tracking.ghosts; g.share > 5 * g.sigma)
+    context.notice(noticed(Symptom::ghost_beads, g.share, {.at = g.is_relaxed ? "relaxed" : "stressed"}));
 }
 
 /// Both images may be out of focus alike, which their ratio does not show. Diameter d of spheres that are as wide as
@@ -128,8 +130,6 @@ StageReport report_of(const TrackedFrame& frame, CellWith cell_with, stage::Stag
                       (cell_with == CellWith::relaxed ? "relaxed" : "stressed") + " image";
   }
   notice_images(tracking, context);
-  if (const Ghosts& g = tracking.ghosts; g.share > 5 * g.sigma)
-    context.notice(noticed(Symptom::ghost_beads, g.share, {.at = g.is_relaxed ? "relaxed" : "stressed"}));
   context.notice(noticed(Symptom::beads_wide, diameter_in_focus_um(tracking.bead_sigma_um, pixel_size_um)));
   if (tracking.period_um > 0) {
     const double farthest_um = std::max(norm(shift_um), figures_of(tracking.field).largest_um);

@@ -204,11 +204,10 @@ TEST_F(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_named) {
 }
 
 TEST_F(TrackEndToEnd, images_out_of_focus_mixed_of_oblong_pixels_or_of_weak_beads_are_named) {
-  const auto told = [&](const test::BeadPair& pair) {
+  const auto output_for = [&](const test::BeadPair& pair) {
     write(folder / "r.tif", pair.relaxed, 0.2);
     write(folder / "s.tif", pair.stressed, 0.2);
-    const std::string ended = output_of(run_track(folder, files("r.tif", "s.tif")));
-    return ended;
+    return output_of(run_track(folder, files("r.tif", "s.tif")));
   };
   test::BeadScene scene{.width = 256, .n_beads = 1300, .drift = {2, 1}};
   std::vector<test::Peak> peaks = test::ring_of_adhesions(scene.width, 3);
@@ -216,21 +215,21 @@ TEST_F(TrackEndToEnd, images_out_of_focus_mixed_of_oblong_pixels_or_of_weak_bead
   defocused.defocus = 1.8;
   oblong.bead_aspect = 1.2;
   weak.brightness = 25;
-  EXPECT_TRUE(fires("defocused", told(test::draw_bead_pair(peaks, defocused))));
+  EXPECT_TRUE(fires("defocused", output_for(test::draw_bead_pair(peaks, defocused))));
   test::BeadScene wide = scene;  // 0.4 um, as beads of 1.4 um
   wide.bead_sigma = 2;
-  EXPECT_TRUE(fires("defocused", "beads look", told(test::draw_bead_pair(peaks, wide))));
-  EXPECT_FALSE(fires("defocused", "beads look", told(test::draw_bead_pair(peaks, scene))));
-  const std::string of_oblong = told(test::draw_bead_pair(peaks, oblong));
+  EXPECT_TRUE(fires("defocused", "beads look", output_for(test::draw_bead_pair(peaks, wide))));
+  EXPECT_FALSE(fires("defocused", "beads look", output_for(test::draw_bead_pair(peaks, scene))));
+  const std::string of_oblong = output_for(test::draw_bead_pair(peaks, oblong));
   EXPECT_TRUE(fires("beads-not-round", of_oblong)) << of_oblong;
   EXPECT_TRUE(has_words(of_oblong, "caution (beads-not-round)"));
   test::BeadPair mixed = test::draw_bead_pair(peaks, scene);
-  EXPECT_FALSE(fires("pictures-mixed", told(mixed)));
+  EXPECT_FALSE(fires("pictures-mixed", output_for(mixed)));
   for (std::size_t k = 0; k < mixed.relaxed.pixels.size(); ++k)
     mixed.relaxed.pixels[k] = 0.8f * mixed.relaxed.pixels[k] + 0.2f * mixed.stressed.pixels[k];
-  EXPECT_TRUE(fires("pictures-mixed", "relaxed", told(mixed)));
+  EXPECT_TRUE(fires("pictures-mixed", "relaxed", output_for(mixed)));
   for (test::Peak& peak : peaks) peak.radius *= 4;  // narrower ones no window shows
-  const std::string of_weak = told(test::weakened(test::draw_bead_pair(peaks, weak), {.levels = 40}, 1));
+  const std::string of_weak = output_for(test::weakened(test::draw_bead_pair(peaks, weak), {.levels = 40}, 1));
   EXPECT_TRUE(fires("field-smoothed", "Windows of", of_weak)) << of_weak;
 }
 
